@@ -1,4 +1,4 @@
-//! Tells the linker about the board: its memory map and its interrupt vectors.
+//! Gives the linker the board's files: its memory map and its interrupt vectors.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};

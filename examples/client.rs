@@ -29,7 +29,7 @@ fn ask(port: &mut (impl Read + Write), id: u16, body: Body) -> Result<Reply, Box
 }
 
 fn session(mut port: impl Read + Write) -> Result<(), Box<dyn Error>> {
-    // Ends whatever the line has carried so far.
+    // Ends what the line has carried so far.
     port.write_all(&[DELIMITER])?;
     for (id, body) in (1..).zip([Body::Hello, Body::Status]) {
         println!("{:?}", ask(&mut port, id, body));

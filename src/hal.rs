@@ -29,7 +29,7 @@ pub trait Amplifiers {
     /// brake go first.
     fn write(&mut self, outputs: &Outputs);
 
-    /// Whose converters held something else than they were told when the last call of [`begin`](Self::begin) or
+    /// Whose converters held another word than the one written when the last call of [`begin`](Self::begin) or
     /// [`write`](Self::write) looked. If any did, that call has disabled the amplifiers.
     fn mismatches(&self) -> [bool; 3] {
         [false; 3]
@@ -59,7 +59,7 @@ pub trait Serial {
 /// The flash that settings are stored in. Writing it may stop the processor for as long as an erasure takes.
 pub trait SettingsFlash: NorFlash {
     /// True if the amplifiers' enable line is low, as the pin itself shows. Asked before every erasure and every set that is
-    /// written, whatever the tasks have agreed on.
+    /// written, independent of the tasks.
     fn outputs_are_off(&self) -> bool;
 }
 

@@ -181,7 +181,7 @@ pub enum InjectedFault {
     StackOverflow = 4,
     /// Requests an interrupt without a handler.
     StrayInterrupt = 5,
-    /// Loops for ever with interrupts masked.
+    /// Loops indefinitely with interrupts masked.
     Hang = 6,
     /// Masks interrupts for a control period and a half, where a clock paces the run.
     LateTick = 7,
@@ -213,12 +213,17 @@ impl InputRecord {
     /// The word of the flags; its low half are the switches.
     pub const FLAGS_WORD: usize = 4;
 
-    /// Bits of the flags' word above the switches': the lowest of three, x first.
+    /// First of three bits, x first, of index pulses in the flags' word.
     const INDEX_SEEN: u32 = 16;
+    /// First of three bits of stale samples.
     const STALE: u32 = 19;
+    /// First of three bits of invalid encoder readings.
     const INVALID: u32 = 22;
+    /// Bit of a lost link.
     const LINK_LOST: u32 = 25;
+    /// First of three bits of stuck converters.
     const STUCK: u32 = 26;
+    /// Bit of a slow reading of the encoders.
     const SLOW: u32 = 29;
     /// The flags beside the switches, one of which is seldom set.
     pub const SELDOM: u32 = !0 << Self::INDEX_SEEN;

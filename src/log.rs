@@ -24,6 +24,7 @@ use crate::board::{self, SettingsFlash};
 
 /// Lines of a kind in a second at 10 kHz: more are counted, not printed.
 const LINES: u16 = 5;
+/// Ticks of a second at 10 kHz.
 const SECOND_TICKS: u32 = 10_000;
 
 /// Lines for which the queue to the log had no room.

@@ -235,7 +235,7 @@ mod app {
         // Behind a pointer of unknown value: each access then is one from a base register. Where control lies is known when the
         // image is linked, and the compiler would make every address of two halves.
         let control = core::hint::black_box(&mut **cx.local.control);
-        control.hear(FRAMES.load(Ordering::Relaxed));
+        control.note_requests(FRAMES.load(Ordering::Relaxed));
         let mut inputs = Inputs {
             readings: cx.local.encoders.read().into(),
             switches,
@@ -250,7 +250,7 @@ mod app {
 
         TICK.store(control.state().tick(), Ordering::Relaxed);
         if let Some(request) = cx.local.operator.request() {
-            // A full queue drops the newest request: whoever asks too fast asks again.
+            // A full queue drops the newest request: a host that asks too fast repeats it.
             let _ = cx.local.requests_in.enqueue(request);
         }
         let elapsed = cx.local.tick.elapsed_cycles();

@@ -161,7 +161,7 @@ function show() {
 function showLoop() {
   const loop = bench.request({ loop: { axis } });
   bodePlot.draw(loop);
-  $("margins-told").textContent = loop.told?.margins ?? "the settings have no plant";
+  $("margins-settings").textContent = loop.settings_plant?.margins ?? "the settings have no plant";
   $("margins-true").textContent = loop.true_stage?.margins ?? "the law has no linear form";
 }
 

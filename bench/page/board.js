@@ -1,18 +1,18 @@
 "use strict";
-// The machine's view: what a board tells, live, and the few buttons that move it. Whatever moves needs a press; nothing is
+// The machine's view: what a board reports, live, and the few buttons that move it. Every motion needs a press; nothing is
 // repeated; Stop waits for nothing.
 
 // Time between two polls of the machine, ms; its host counts as silent after 500.
 const POLL_MS = 100;
 // Silence after which nothing is shown as live any more, ms; longer while it erases its flash.
 const SILENT_MS = 1000;
-// Time for which a choice of channels stands before the board is told, ms.
+// Time for which a choice of channels stands before the board receives it, ms.
 const CHOICE_MS = 150;
 // Events that are kept.
 const MOST_EVENTS = 60;
 const STRIPPED = ["x.error", "y.error", "z.error"];
 const MODES = { hold: "holds", plan: "moves", jog: "jogs", home: "homes", stream: "streams", stopping: "brakes", "open-loop": "is driven" };
-// A number as text; one that is none is told as nothing.
+// A number as text; one that is none is shown as a dash.
 const told = (value, digits) => (value === null ? "–" : short(value, digits));
 
 class MachineView {
@@ -140,7 +140,7 @@ class MachineView {
     }
   }
 
-  // The user has gone on: what was told before is not new any more.
+  // The user has gone on: what was shown before is not new any more.
   acted() {
     this.warned = false;
     if (this.isLive) this.alarm("");
@@ -201,7 +201,7 @@ class MachineView {
     this.show();
   }
 
-  // Selects anew once the choice has stood for a moment: the board takes one selection after the other.
+  // Selects again once the choice has stood for a moment: the board takes one selection after the other.
   choose() {
     clearTimeout(this.choosing);
     this.choosing = setTimeout(() => this.link && this.watch(), CHOICE_MS);

@@ -1,5 +1,5 @@
 "use strict";
-// The machine's settings: found by path, changed in its draft, compared with what acts, applied, stored.
+// The machine's settings: found by path, changed in its draft, compared with the settings in force, applied, stored.
 
 // Settings whose values are read for one search at most.
 const MOST_SHOWN = 40;
@@ -19,7 +19,7 @@ class Draft {
     $("m-apply").addEventListener("click", () => this.apply());
     $("m-revert").addEventListener("click", () => this.tryTo(async () => {
       await this.ask("revert");
-      this.say("the draft is what acts");
+      this.say("the draft equals the settings in force");
       await this.reload();
     }));
     $("m-diff").addEventListener("click", () => this.tryTo(() => this.compare()));
@@ -124,7 +124,7 @@ class Draft {
     }
   }
 
-  // Shows where the draft differs from what acts.
+  // Shows where the draft differs from the settings in force.
   async compare() {
     const rows = [];
     for (const path of await this.pages("edited")) {

@@ -123,7 +123,7 @@ class BodePlot {
     ctx.strokeStyle = c.rule;
     const y = plot.valToPos(level, "y", true);
     line(bbox.left, y, bbox.left + bbox.width, y);
-    const crossover = this.loop?.told?.crossover_hz;
+    const crossover = this.loop?.settings_plant?.crossover_hz;
     if (crossover) {
       ctx.setLineDash([3 * devicePixelRatio, 3 * devicePixelRatio]);
       const x = plot.valToPos(crossover, "x", true);
@@ -136,7 +136,7 @@ class BodePlot {
     const none = loop.frequency_hz.map(() => null);
     ["gain_db", "phase_deg"].forEach((curve, index) => {
       const of = (which) => loop[which]?.[curve] ?? none;
-      this.charts[index].plot.setData([loop.frequency_hz, of("told"), of("true_stage")]);
+      this.charts[index].plot.setData([loop.frequency_hz, of("settings_plant"), of("true_stage")]);
     });
   }
 }

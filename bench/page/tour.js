@@ -29,13 +29,13 @@ const TOUR = [
   {
     title: "N-PID alone",
     law: "n-pid", feedforward: "none",
-    text: "Without a model of friction: a PID whose gain grows with the error, so that it pulls harder in a glitch. Its gain is held to what the loop bears.",
+    text: "Without a model of friction: a PID whose gain grows with the error, so that it pulls harder in a glitch. Its gain is held to what the loop allows.",
     look: "the spikes: lower than with PID, in the same places, and with a small oscillation on their tops, where the gain is highest. The open loop is that of small errors, and the same.",
   },
   {
     title: "N-PID, static and GMS",
     law: "n-pid", feedforward: "combined",
     text: "The whole law. The feedforward takes the friction that is known, the nonlinear gain what is not. Now turn the friction of the stage: the law does not know of it.",
-    look: "how much the error grows when the friction doubles, with this law and with step 4; then tell the law the friction.",
+    look: "how much the error grows when the friction doubles, with this law and with step 4; then set the law's friction.",
   },
 ];

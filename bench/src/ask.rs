@@ -57,7 +57,7 @@ pub enum Ask {
         /// Zero, or where the page before ended.
         cursor: u16,
     },
-    /// The paths at which the draft differs from what acts, page by page.
+    /// The paths at which the draft differs from the settings in force, page by page.
     Edited {
         /// Zero, or where the page before ended.
         cursor: u16,
@@ -81,11 +81,11 @@ pub enum Ask {
     },
     /// Puts the draft in force.
     Apply,
-    /// Replaces the draft by what acts.
+    /// Replaces the draft by the settings in force.
     Revert,
     /// Stores the draft for the next start.
     Store {
-        /// Its origin, for whoever reads it later.
+        /// Its origin, for later readers.
         text: String,
     },
 }

@@ -146,7 +146,7 @@ pub struct Bench {
     law: LawMachine<f32, FIRMWARE_ELEMENTS>,
     stage: SimulatedStage,
     ripples: [Ripple; 3],
-    /// Linear damping of each axis, V s/mm: B / A, which no motion can tell from friction.
+    /// Linear damping of each axis, V s/mm: B / A, which no motion can distinguish from friction.
     damping_v_s_per_mm: [f64; 3],
     operator: Operator,
 }
@@ -284,17 +284,17 @@ impl Bench {
         Ok(())
     }
 
-    /// Tells the law the stage's own friction.
+    /// Sets the law's friction to the stage's own.
     ///
     /// # Errors
     /// Friction that the firmware would refuse, in words.
-    pub fn tell_friction(&mut self) -> Result<(), String> {
+    pub fn set_true_friction(&mut self) -> Result<(), String> {
         let mut settings = self.file.stage.clone();
         for (axis, truth) in settings.axes.iter_mut().zip(self.truth.stage().axes) {
             axis.friction.sliding = truth
                 .friction
                 .map(|model| with_linear_damping(model, &truth));
-            axis.friction.gms = as_told(&truth);
+            axis.friction.gms = firmware_elements(&truth);
         }
         self.take(settings)?;
         for set in &mut self.set_here {
@@ -443,7 +443,7 @@ fn radial([x, y]: [f64; 2], [error_x, error_y]: [f64; 2], radius_mm: f64) -> (f6
     (out_y.atan2(out_x), place_x.hypot(place_y) - radius_mm)
 }
 
-/// Friction as a run at constant velocity shows it: with the linear damping, which no motion can tell from it.
+/// Friction as a run at constant velocity shows it: with the linear damping, which no motion can distinguish from it.
 fn with_linear_damping(model: &StaticFriction, truth: &AxisParameters) -> StaticFriction {
     StaticFriction {
         viscous_v_s_per_mm: model.viscous_v_s_per_mm + truth.damping_per_s / truth.gain_mm_per_v_s2,
@@ -452,7 +452,7 @@ fn with_linear_damping(model: &StaticFriction, truth: &AxisParameters) -> Static
 }
 
 /// Pre-sliding friction with as many elements as the firmware has, on the axis' own range and level.
-fn as_told(truth: &AxisParameters) -> GmsParameters {
+fn firmware_elements(truth: &AxisParameters) -> GmsParameters {
     let PerDirection { positive, negative } = &truth.friction;
     let breakaway_v = 0.5 * (positive.curve.breakaway_v + negative.curve.breakaway_v);
     let knees = truth.gms.elements.iter();
@@ -527,14 +527,14 @@ mod tests {
     }
 
     #[test]
-    fn friction_that_was_told_is_the_stage_s_own() {
+    fn friction_set_from_the_stage_is_the_stage_s_own() {
         let mut bench = Bench::default();
         bench.turn("friction", 2.0).unwrap();
-        bench.tell_friction().unwrap();
+        bench.set_true_friction().unwrap();
         let own = bench.truth().stage();
-        let told = &bench.settings().axes[1].friction.sliding.positive.curve;
+        let curve = &bench.settings().axes[1].friction.sliding.positive.curve;
         assert_eq!(
-            told.coulomb_v,
+            curve.coulomb_v,
             own.axes[1].friction.positive.curve.coulomb_v
         );
     }

@@ -1,4 +1,4 @@
-//! The settings that the page offers to turn: of the law in force, of the feedforward, and of the friction that both were told.
+//! The settings that the page offers to turn: of the law in force, of the feedforward, and of the friction that both use.
 
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
@@ -55,7 +55,7 @@ pub struct Controls {
     pub feedback: Vec<Number>,
     /// Numbers of the feedforward.
     pub shares: Vec<Number>,
-    /// Friction as the law was told.
+    /// Friction in the law's settings.
     pub friction: Vec<Number>,
 }
 

@@ -1,6 +1,6 @@
 //! The functions that the page calls, over WebAssembly's linear memory.
 //!
-//! A function that answers leaves bytes or numbers, returns where, and [`length`] tells how many bytes; they stay until the
+//! A function that answers leaves bytes or numbers, returns where, and [`length`] returns the number of bytes; they stay until the
 //! next call. One bench and one session with a machine live in the instance, which has one thread.
 //!
 //! The only `unsafe` here is that of giving a function its plain name: no pointer is followed on this side.
@@ -133,10 +133,10 @@ extern "C" fn link_frame() -> *const u8 {
 extern "C" fn link_take() -> *const u8 {
     with(|exchange| {
         exchange.samples.clear();
-        let told = exchange
+        let messages = exchange
             .session
             .take(&exchange.bytes, &mut exchange.samples);
-        exchange.leave_json(&Value::Array(told))
+        exchange.leave_json(&Value::Array(messages))
     })
 }
 

@@ -4,7 +4,7 @@
 //! - [`bench`](mod@bench): law, stage and motion, and what may be changed about them while the axes move;
 //! - [`truth`]: the stage's own parameters, which the law does not know;
 //! - [`controls`]: the settings that the page offers, from the table of all settings;
-//! - [`loop_response`]: the open loop over frequency, as the law was told and as the stage is;
+//! - [`loop_response`]: the open loop over frequency, with the plant of the settings and with the stage's own;
 //! - [`request`]: requests of the page, and their replies, as JSON;
 //! - [`ask`], [`session`], [`told`]: the page's end of the link to a machine: requests by name, frames, what comes back;
 //! - `exports`: the functions that WebAssembly calls.

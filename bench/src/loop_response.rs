@@ -1,4 +1,4 @@
-//! The open loop of an axis over frequency: with the plant that the law was told of, and with the stage's own.
+//! The open loop of an axis over frequency: with the plant of the settings, and with the stage's own.
 
 use std::f64::consts::TAU;
 
@@ -34,7 +34,7 @@ pub struct LoopResponse {
     /// Frequencies, Hz.
     pub frequency_hz: Vec<f64>,
     /// With the plant of the settings; none if they have none.
-    pub told: Option<Curve>,
+    pub settings_plant: Option<Curve>,
     /// With the stage's own.
     pub true_stage: Option<Curve>,
 }
@@ -62,7 +62,7 @@ impl LoopResponse {
             Some(Curve::of(&open_loop, &frequency_hz))
         };
         Self {
-            told: settings.axes[axis].plant.as_ref().and_then(curve),
+            settings_plant: settings.axes[axis].plant.as_ref().and_then(curve),
             true_stage: curve(&own),
             frequency_hz,
         }
@@ -111,17 +111,17 @@ mod tests {
     fn the_preset_s_loop_has_its_margins_and_no_jump_of_phase() {
         let settings = StageSettings::simulated();
         let found = LoopResponse::of(&settings, &StageParameters::real(), 0);
-        let told = found.told.unwrap();
+        let of_settings = found.settings_plant.unwrap();
         assert!(
-            told.margins.starts_with("gain margin 9."),
+            of_settings.margins.starts_with("gain margin 9."),
             "{}",
-            told.margins
+            of_settings.margins
         );
-        assert!((told.crossover_hz.unwrap() - 65.0).abs() < 1.0);
-        for pair in told.phase_deg.windows(2) {
+        assert!((of_settings.crossover_hz.unwrap() - 65.0).abs() < 1.0);
+        for pair in of_settings.phase_deg.windows(2) {
             assert!((pair[1] - pair[0]).abs() < 60.0, "{pair:?}");
         }
-        assert_eq!(found.frequency_hz.len(), told.gain_db.len());
+        assert_eq!(found.frequency_hz.len(), of_settings.gain_db.len());
         assert!(found.true_stage.is_some());
     }
 }

@@ -40,7 +40,7 @@ pub enum Request {
         /// Its value.
         value: f64,
     },
-    /// Tells the law the stage's own friction.
+    /// Sets the law's friction to the stage's own.
     TellFriction,
     /// Starts another motion.
     Start {
@@ -115,7 +115,7 @@ fn act(bench: &mut Bench, request: Request) -> Result<Value, String> {
         Request::Set { path, value } => bench.set(&path, &value.to_string())?,
         Request::Choose { law, feedforward } => bench.choose(&law, &feedforward)?,
         Request::Turn { knob, value } => bench.turn(&knob, value)?,
-        Request::TellFriction => bench.tell_friction()?,
+        Request::TellFriction => bench.set_true_friction()?,
         Request::Start { motion } => bench.start(motion)?,
         Request::Restart => bench.restart(),
         Request::Reset => *bench = Bench::default(),
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_done_is_told_in_words() {
+    fn what_cannot_be_done_is_reported_in_words() {
         let mut bench = Bench::default();
         for request in [
             json!("dance"),

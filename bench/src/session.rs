@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use crate::ask::Ask;
 use crate::told;
 
-/// Control rate until the machine has told its own, Hz.
+/// Control rate until the machine has reported its own, Hz.
 const RATE_HZ: f64 = 10_000.0;
 /// Requests whose answers are waited for at most; of more, the oldest is forgotten.
 const MOST_ASKED: usize = 64;
@@ -36,7 +36,7 @@ pub struct Session {
     /// The requests that have no answer yet.
     asked: BTreeMap<u16, Body>,
     selection: Option<Selection>,
-    /// Settings as far as the machine has told them; at first those of the simulated stage.
+    /// Settings as far as the machine has reported them; at first those of the simulated stage.
     settings: StageSettings,
     rate_hz: f64,
 }
@@ -64,7 +64,7 @@ impl Session {
         let body = ask.body(self.rate_hz)?;
         let id = self.next_id;
         self.next_id = self.next_id.wrapping_add(1);
-        // Ends whatever the other end takes for a frame's beginning: these are not to be lost with it.
+        // Ends what the other end takes for a frame's beginning: these are not to be lost with it.
         if matches!(body, Body::Hello | Body::Stop | Body::Disable) {
             frame.push(DELIMITER);
         }
@@ -84,28 +84,28 @@ impl Session {
     /// `{"foreign": ...}` from a machine of another release. Samples go to `samples`: the time since the selection, s,
     /// and then a value of each channel in the unit in which it is shown.
     pub fn take(&mut self, bytes: &[u8], samples: &mut Vec<f64>) -> Vec<Value> {
-        let mut told = Vec::new();
+        let mut messages = Vec::new();
         for &byte in bytes {
             let Some(payload) = self.receiver.push(byte) else {
                 continue;
             };
             match frame::decode::<Message>(payload) {
                 Ok(Message::Response(response)) => {
-                    told.extend(self.answer(response.id, response.result));
+                    messages.extend(self.answer(response.id, response.result));
                 }
                 Ok(Message::Notice(Notice::Telemetry(block))) => self.sample(&block, samples),
                 Ok(Message::Notice(Notice::Event { tick, event, .. })) => {
-                    told.push(json!({ "event": told::event(tick, &event, self.rate_hz) }));
+                    messages.push(json!({ "event": told::event(tick, &event, self.rate_hz) }));
                 }
-                Ok(Message::Notice(Notice::Log(text))) => told.push(json!({ "log": text })),
+                Ok(Message::Notice(Notice::Log(text))) => messages.push(json!({ "log": text })),
                 Err(error @ DecodeError::Version(_)) => {
-                    told.push(json!({ "foreign": error.to_string() }));
+                    messages.push(json!({ "foreign": error.to_string() }));
                 }
                 // A message that a later release of this version has added.
                 Err(DecodeError::Malformed) => {}
             }
         }
-        told
+        messages
     }
 
     /// The answer to a request that was made; another's is passed over.
@@ -160,7 +160,7 @@ impl Session {
         Ok(told::setting(path, json, &self.settings))
     }
 
-    /// Takes samples of what was selected from now on, and tells their channels and time apart, s.
+    /// Takes samples of what was selected from now on, and returns their channels and time apart, s.
     fn select(&mut self, body: &Body, generation: u8) -> Value {
         let Body::Telemetry(TelemetryRequest::Select {
             channels,
@@ -225,15 +225,15 @@ mod tests {
         frame::encode(message, &mut buffer).unwrap().to_vec()
     }
 
-    /// Asks, lets `reply` be the answer, and gives what the page is told.
+    /// Asks, lets `reply` be the answer, and returns what the page receives.
     fn exchange(session: &mut Session, request: &str, reply: Result<Reply, LinkError>) -> Value {
         let asked = session.ask(request.as_bytes(), &mut Vec::new()).unwrap();
         let response = Response {
             id: asked["id"].as_u64().unwrap() as u16,
             result: reply,
         };
-        let told = session.take(&bytes(&Message::Response(response)), &mut Vec::new());
-        told[0]["answer"].clone()
+        let messages = session.take(&bytes(&Message::Response(response)), &mut Vec::new());
+        messages[0]["answer"].clone()
     }
 
     #[test]
@@ -282,10 +282,10 @@ mod tests {
         session.take(&block(3), &mut samples);
         let count_mm = StageSettings::simulated().axes[1].encoder.resolution_mm;
         // 30 s on a chart are a sample every 100 ticks.
-        let wanted = [0.07, 2.0, 2000.0 * count_mm, 0.08, 3.0, 2001.0 * count_mm];
-        assert_eq!(samples.len(), wanted.len());
-        for (sample, wanted) in samples.iter().zip(wanted) {
-            assert!((sample - wanted).abs() < 1e-6, "{samples:?}");
+        let expected = [0.07, 2.0, 2000.0 * count_mm, 0.08, 3.0, 2001.0 * count_mm];
+        assert_eq!(samples.len(), expected.len());
+        for (sample, expected) in samples.iter().zip(expected) {
+            assert!((sample - expected).abs() < 1e-6, "{samples:?}");
         }
     }
 
@@ -294,18 +294,18 @@ mod tests {
         let mut session = Session::default();
         let path = "/axes/2/encoder/resolution_mm";
         let (kind, bytes) = setting_value::from_json(path, "0.002").unwrap();
-        let told = exchange(
+        let answer = exchange(
             &mut session,
             &json!({ "get": { "path": path } }).to_string(),
             Ok(Reply::Value(LeafValue { kind, bytes })),
         );
-        assert_eq!(told["ok"]["value"], 0.002);
-        assert_eq!(told["ok"]["unit"], "mm");
+        assert_eq!(answer["ok"]["value"], 0.002);
+        assert_eq!(answer["ok"]["unit"], "mm");
         assert_eq!(session.settings.axes[2].encoder.resolution_mm, 0.002);
     }
 
     #[test]
-    fn a_refusal_and_a_restart_are_told_apart() {
+    fn a_refusal_and_a_restart_are_distinguished() {
         let mut session = Session::default();
         let text = quadrant::link::message::text(format_args!("home x first"));
         let refused = exchange(&mut session, r#""enable""#, Err(LinkError::Refused(text)));
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn events_and_machines_of_other_releases_are_told_in_words() {
+    fn events_and_machines_of_other_releases_are_reported_in_words() {
         let mut session = Session::default();
         let event = Message::Notice(Notice::Event {
             sequence: 0,
@@ -326,13 +326,18 @@ mod tests {
                 axis: Some(AxisName::X),
             },
         });
-        let told = session.take(&bytes(&event), &mut Vec::new());
-        assert_eq!(told[0]["event"]["text"], "fault 3 of x");
-        assert_eq!(told[0]["event"]["time_s"], 0.5);
+        let messages = session.take(&bytes(&event), &mut Vec::new());
+        assert_eq!(messages[0]["event"]["text"], "fault 3 of x");
+        assert_eq!(messages[0]["event"]["time_s"], 0.5);
         // The payload 09 00, with a right CRC.
         let foreign = [0x02, 0x09, 0x05, 0xB6, 0xA9, 0x1B, 0x90, 0x00];
-        let told = session.take(&foreign, &mut Vec::new());
-        assert!(told[0]["foreign"].as_str().unwrap().contains("version 9"));
+        let messages = session.take(&foreign, &mut Vec::new());
+        assert!(
+            messages[0]["foreign"]
+                .as_str()
+                .unwrap()
+                .contains("version 9")
+        );
     }
 
     #[test]

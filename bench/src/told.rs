@@ -119,14 +119,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_input_is_told_by_its_name() {
-        let told = inputs(&Inputs {
+    fn an_input_is_reported_by_its_name() {
+        let reported = inputs(&Inputs {
             tick: 0,
             switches: 1 << 15 | 1 << 6,
             indexed: AxisSet::NONE.with(AxisName::Z),
             refusal: None,
         });
-        let active: Vec<&str> = told["inputs"]
+        let active: Vec<&str> = reported["inputs"]
             .as_array()
             .unwrap()
             .iter()
@@ -134,17 +134,20 @@ mod tests {
             .map(|input| input["name"].as_str().unwrap())
             .collect();
         assert_eq!(active, ["emergency-stop", "y.positive-limit"]);
-        assert_eq!(told["indexed"], json!(["z"]));
+        assert_eq!(reported["indexed"], json!(["z"]));
     }
 
     #[test]
-    fn a_setting_is_told_with_unit_range_and_meaning() {
+    fn a_setting_is_reported_with_unit_range_and_meaning() {
         let settings = StageSettings::simulated();
-        let told = setting("/axes/1/feedback/integral_limit_v", json!(2.0), &settings);
-        assert_eq!(told["unit"], "V");
-        assert_eq!(told["range"][1], settings.axes[1].amplifier.output_limit_v);
+        let reported = setting("/axes/1/feedback/integral_limit_v", json!(2.0), &settings);
+        assert_eq!(reported["unit"], "V");
+        assert_eq!(
+            reported["range"][1],
+            settings.axes[1].amplifier.output_limit_v
+        );
         assert!(
-            told["meaning"]
+            reported["meaning"]
                 .as_str()
                 .unwrap()
                 .starts_with("The integral")

@@ -60,8 +60,9 @@ const RATE_HZ: f64 = 1e4;
 const STEPS: u64 = 1_000_000;
 /// Share of half the travel that the sine takes unless an amplitude is given.
 const TRAVEL_SHARE: f64 = 0.8;
-/// Largest amplitude, mm, and smallest and largest velocity, mm/s.
+/// Largest amplitude, mm.
 const MOST_AMPLITUDE_MM: f64 = 1e4;
+/// Least and largest velocity, mm/s.
 const VELOCITY_RANGE_MM_S: (f64, f64) = (0.01, 1e4);
 /// Longest cycle that is simulated, s.
 const MOST_CYCLE_S: f64 = 600.0;

@@ -140,7 +140,7 @@ impl LinkEndpoint {
         share: Option<&str>,
     ) -> anyhow::Result<Client> {
         let client = self.open(simulation, flash, share)?;
-        heed_signals(client.interrupt())?;
+        stop_on_signals(client.interrupt())?;
         terminal::keep_modes();
         Ok(client)
     }
@@ -185,7 +185,7 @@ impl LinkEndpoint {
             Self::Look(address, token) => {
                 let socket = TcpTransport::look(address, token.as_deref()).with_context(|| {
                     format!(
-                        "nobody shares a machine at {address}; whoever holds it gives `quadrant connect --share {address}`"
+                        "nobody shares a machine at {address}; its holder starts `quadrant connect --share {address}`"
                     )
                 })?;
                 session(socket, share)
@@ -218,11 +218,11 @@ fn session(transport: impl Transport + 'static, share: Option<&str>) -> anyhow::
     Ok(client)
 }
 
-/// Signals after which this program ends, heeded or not: the machine stops what its host has started when that is gone.
+/// Signals after which this program ends, acted on or not: the machine stops what its host has started when that is gone.
 const SIGNALS: u32 = 3;
 
 /// Stops the axes on Ctrl-C, and when this program is to end.
-fn heed_signals(interrupt: Interrupt) -> anyhow::Result<()> {
+fn stop_on_signals(interrupt: Interrupt) -> anyhow::Result<()> {
     on_signals(move |ends| {
         let requests = match ends {
             true => interrupt.request_end(),

@@ -27,10 +27,10 @@ mod tests {
     use super::explained;
 
     #[test]
-    fn a_cause_is_told_once() {
+    fn a_cause_is_reported_once() {
         let cause = anyhow!("the file is empty");
-        let told = explained(&cause.context("stage.toml: the file is empty"));
-        assert_eq!(told, "stage.toml: the file is empty");
+        let text = explained(&cause.context("stage.toml: the file is empty"));
+        assert_eq!(text, "stage.toml: the file is empty");
         let result: anyhow::Result<()> = Err(anyhow!("no such file")).context("stage.toml");
         assert_eq!(explained(&result.unwrap_err()), "stage.toml: no such file");
     }

@@ -98,14 +98,14 @@ impl Output {
         Ok(())
     }
 
-    /// Writes a table where CSV is wanted, and prints it.
+    /// Writes a table where CSV is requested, and prints it.
     pub fn table(&self, table: &Table) -> anyhow::Result<()> {
         self.keep_table(table)?;
         say!("{}", table.to_text(terminal::output_width()));
         Ok(())
     }
 
-    /// Writes a table where CSV is wanted.
+    /// Writes a table where CSV is requested.
     pub fn keep_table(&self, table: &Table) -> anyhow::Result<()> {
         if self.format.contains(&Format::Csv) {
             table.write_csv(&self.file(&format!("{}.csv", table.id))?)?;
@@ -113,7 +113,7 @@ impl Output {
         Ok(())
     }
 
-    /// Writes a page in the formats that are wanted, under the stem of `name`.
+    /// Writes a page in the requested formats, under the stem of `name`.
     pub fn page(&self, page: &Page, name: &str) -> anyhow::Result<()> {
         for line in self.keep_page(page, name)? {
             say!("{line}");

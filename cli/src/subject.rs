@@ -147,7 +147,7 @@ fn unknown_travel(axis: AxisName) -> String {
 }
 
 /// Runs `measure` on an axis, with the settings to start from: `start`, else those in force, which it has again
-/// afterwards, whatever came of it. `measure` writes its recordings: they are there though the settings are not taken back.
+/// afterwards, also after an error. `measure` writes its recordings: they are there though the settings are not taken back.
 pub(super) fn on_axis<T>(
     machine: &mut dyn Machine,
     axis: AxisName,

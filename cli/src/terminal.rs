@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn what_acts_on_a_terminal_is_shown_by_its_number_and_text_is_as_it_was() {
+    fn what_controls_a_terminal_is_shown_by_its_number_and_text_is_as_it_was() {
         let printed = |text: &str| {
             let mut out = Vec::new();
             write_plain(&mut out, format_args!("{text}")).unwrap();

@@ -91,7 +91,7 @@ impl ChangeDetector {
         }
         self.modes = view.modes;
 
-        let silent = server.greeted && tick.wrapping_sub(server.heard_tick) > SILENT_TICKS;
+        let silent = server.greeted && tick.wrapping_sub(server.request_tick) > SILENT_TICKS;
         if server.greeted && !self.server.greeted {
             report(StateChange::Greeted);
         } else if silent != self.is_silent {
@@ -117,7 +117,7 @@ impl ChangeDetector {
             dropped_events,
             ..
         } = self.server;
-        // A count that is smaller began anew, with another selection of telemetry.
+        // A count that is smaller began again, with another selection of telemetry.
         if server.bad_frames > bad_frames {
             report(StateChange::BadFrames(server.bad_frames - bad_frames));
         }

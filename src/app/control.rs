@@ -94,14 +94,14 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         &self.state
     }
 
-    /// Takes how many valid requests a host has made so far, as [`Intake::frames`](super::Intake::frames) has it. Once a tick.
+    /// Receives the number of valid requests of a host so far, from [`Intake::frames`](super::Intake::frames). Once a tick.
     #[inline(always)]
-    pub fn hear(&mut self, frames: u32) {
-        self.host.hear(frames);
+    pub fn note_requests(&mut self, frames: u32) {
+        self.host.note_requests(frames);
     }
 
     /// One control period: takes what the server has sent, and computes the outputs. It adds to the inputs: the settings'
-    /// changes are its own to tell, and an order of the server's acts when they have no command.
+    /// changes are its own to report, and an order of the server's acts when they have no command.
     #[inline(always)]
     pub fn tick(&mut self, inputs: &mut Inputs) -> Outputs {
         let mut unfit = false;
@@ -167,7 +167,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             commanded: self.commanded,
         };
         if let Some(sample) = self.sampler.step(&mut self.sampling, &seen) {
-            // A full queue drops the newest; its number is missing, so that the server can tell.
+            // A full queue drops the newest; its number is missing, so that the server detects the loss.
             let _ = self.ends.samples.enqueue(sample);
         }
         let full = self
@@ -206,7 +206,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             _ if unfit => Some(Command::Disable),
             Some(command) => {
                 self.overtake(command);
-                self.heeded(Station::Operator, command)
+                self.admit(Station::Operator, command)
             }
             None => match self.ends.orders.dequeue() {
                 Some(order) => self.take_order(order),
@@ -245,7 +245,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
                 return None;
             }
             Order::Spindle(speed) => {
-                self.state.tell_spindle(speed);
+                self.state.set_spindle_speed(speed);
                 return None;
             }
             Order::Lock => {
@@ -262,7 +262,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         };
         let needed = self.operation.host_needed;
         self.host.start(command, needed, &self.plan);
-        self.heeded(Station::Host, command)
+        self.admit(Station::Host, command)
     }
 
     /// Gives axes whose moves have ended their motion in the plan back: `Run` repeats no move.
@@ -277,8 +277,8 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         }
     }
 
-    /// The command, unless it would enable and does not come from whom the rules of now allow to.
-    fn heeded(&self, station: Station, command: Command) -> Option<Command> {
+    /// Returns the command, unless it would enable and the settings in force do not allow that to its station.
+    fn admit(&self, station: Station, command: Command) -> Option<Command> {
         let allowed = command != Command::Enable || self.operation.enabled_by.allows(station);
         allowed.then_some(command)
     }

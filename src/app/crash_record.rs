@@ -1,7 +1,7 @@
 //! The crash record: the cause and text of a failure, in memory that the start-up code does not clear.
 //!
-//! After power-up that memory holds noise, after a reset what was there before: a magic word and a CRC-32 tell the two
-//! apart. The board places the record; this module encodes it.
+//! After power-up that memory holds noise, after a reset what was there before: a magic word and a CRC-32 distinguish the
+//! two. The board places the record; this module encodes it.
 
 use core::fmt::{self, Write};
 

@@ -17,8 +17,8 @@ const STEADY: f32 = 0.03;
 /// Runs of learning for which it stays so: 5 s at 10 kHz.
 const SETTLED_RUNS: u16 = 5_000;
 
-/// Change of a scale that is reported.
-const WORTH_TELLING: f32 = 0.05;
+/// Least change of a scale that is reported.
+const MIN_REPORTED_CHANGE: f32 = 0.05;
 
 /// Scales beyond which the axis needs maintenance: half as much friction again, or a third less.
 const MAINTENANCE: [f32; 2] = [0.67, 1.5];
@@ -35,8 +35,9 @@ pub struct FrictionMonitor {
 /// The memory of one axis; scales less 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct AxisMonitor {
-    /// The scale that was reported last, and that from which it may settle.
-    told: f32,
+    /// The scale that was reported last.
+    reported: f32,
+    /// The scale around which the present one may settle.
     anchor: f32,
     /// Runs of learning near the anchor.
     steady: u16,
@@ -62,7 +63,7 @@ impl AxisMonitor {
         let scale = seen.scale();
         let deviation = scale - 1.0;
         if deviation == 0.0 {
-            // Learning has begun anew: what was reported counted from other settings.
+            // Learning has begun again: what was reported counted from other settings.
             *self = Self::default();
         }
         if seen.status != LearningStatus::Learning || seen.gate() < QUIET {
@@ -73,11 +74,11 @@ impl AxisMonitor {
             self.steady = 0;
         }
         self.steady = self.steady.saturating_add(1);
-        let changed = (deviation - self.told).abs() >= WORTH_TELLING;
+        let changed = (deviation - self.reported).abs() >= MIN_REPORTED_CHANGE;
         if self.steady < SETTLED_RUNS || !changed {
             return None;
         }
-        self.told = deviation;
+        self.reported = deviation;
         Some(scale)
     }
 }

@@ -41,9 +41,9 @@ impl HostNeed {
         }
     }
 
-    /// Takes the number of valid requests so far.
+    /// Receives the number of valid requests so far.
     #[inline(always)]
-    pub(super) fn hear(&mut self, frames: u32) {
+    pub(super) fn note_requests(&mut self, frames: u32) {
         self.silent = if self.frames == frames {
             self.silent.saturating_add(1)
         } else {

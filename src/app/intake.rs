@@ -90,7 +90,7 @@ impl<'q> Intake<'q> {
         }
     }
 
-    /// Number of valid requests so far, for [`Control::hear`](super::Control::hear).
+    /// Number of valid requests so far, for [`Control::note_requests`](super::Control::note_requests).
     pub const fn frames(&self) -> u32 {
         self.frames
     }

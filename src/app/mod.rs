@@ -13,7 +13,7 @@
 //!
 //! What passes from one half to the other is owned by one of them at a time, and goes through bounded queues ([`Queues`])
 //! that neither side waits for; beside them there are counters, each with one writer. **A decision is taken on the state of
-//! now, by the one who acts on it**: the control interrupt. The others judge an older state to tell a person early. Settings are built by the slow half into the one
+//! now, by the one who acts on it**: the control interrupt. The others judge an older state to inform a person early. Settings are built by the slow half into the one
 //! [`Axis`](quadrant_law::axis::Axis) that the law does not use, the back buffer, and swapped whole, by reference.
 //!
 //! The firmware puts each piece into an RTIC task; a host runs them one after the other in one thread

@@ -77,6 +77,7 @@ const ONE: usize = 2;
 const ORDERS: usize = 8;
 /// Bytes of the link that wait for the server: two of the longest frames, as in the reference board's own ring.
 const BYTES: usize = 1024;
+/// Size of the queue of a stream's items.
 const STREAM_ITEMS: usize = 16;
 /// Samples of each tick of 3 ms at 10 kHz.
 const SAMPLES: usize = 32;

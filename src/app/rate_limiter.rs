@@ -13,7 +13,7 @@ struct Kind {
 
 /// Lets at most `lines` lines of each of `KINDS` kinds through in `window_ticks` ticks.
 ///
-/// A fixed cost and no memory that grows, whatever the rate. Ask [`overdue`](Self::overdue) before
+/// A fixed cost and no memory that grows, at any rate. Ask [`overdue`](Self::overdue) before
 /// [`admits`](Self::admits), and now and then while nothing happens: what was left out is reported then.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RateLimiter<const KINDS: usize> {

@@ -35,7 +35,7 @@ impl StartRecord {
     }
 
     /// Counts a start. `crashed`: the run before ended by a panic, a fault of the processor or the watchdog; if not, the
-    /// count begins anew.
+    /// count begins again.
     #[must_use]
     pub const fn begin(self, crashed: bool) -> Self {
         Self {

@@ -41,8 +41,8 @@ fn panic(info: &PanicInfo) -> ! {
     fail(CrashCause::Panic, format_args!("{info}"))
 }
 
-/// The hard fault's vector. It begins with a fresh stack, as the old one may be what failed: whoever was interrupted is
-/// not coming back.
+/// The hard fault's vector. It begins with a fresh stack, as the old one may be what failed: the interrupted code does
+/// not return.
 // SAFETY: the vector table's name and calling convention; it moves the stack pointer, hence naked, and never returns.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]

@@ -4,7 +4,7 @@
 //!
 //! - `device`: what RTIC needs to know of the chip, with interrupts named by their *role*
 //!   (`CONTROL_TICK`, `DISPATCHER_0`..`DISPATCHER_2`) instead of by the peripheral behind them;
-//! - `Board::init`, which starts the chip and hands out `encoders`, `operator`, `amplifiers`, `tick` and `idle`, and on
+//! - `Board::init`, which starts the chip and returns `encoders`, `operator`, `amplifiers`, `tick` and `idle`, and on
 //!   the reference board `switches`, `serial`, `watchdog`, `flash` and `reset_cause`: the traits are in
 //!   `quadrant::hal`;
 //! - `RATES_HZ`, the control rates that the board is up to;
@@ -16,7 +16,7 @@
 //! `crash_record` keeps the cause of a panic or a fault until the next start, and `start_record` how many starts in a row
 //! have not lasted, on any board.
 //!
-//! `docs/porting.md` tells how a board is added.
+//! `docs/porting.md` describes how a board is added.
 
 #[cfg(all(feature = "board-mps2", feature = "board-nucleo-f446re"))]
 compile_error!("choose one board: `board-mps2` or `board-nucleo-f446re`, not both");

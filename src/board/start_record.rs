@@ -24,7 +24,7 @@ fn byte(index: usize) -> *mut u8 {
 pub(crate) fn read() -> StartRecord {
     let mut record = [0; StartRecord::BYTES];
     for (index, slot) in record.iter_mut().enumerate() {
-        // SAFETY: inside the record; whatever the memory holds is a byte, and volatile, as no Rust code has written it.
+        // SAFETY: inside the record; every content of the memory is a byte, and volatile, as no Rust code has written it.
         *slot = unsafe { byte(index).read_volatile() };
     }
     StartRecord::decode(record)

@@ -3,7 +3,7 @@
 /// Read position in a ring of `N` bytes.
 ///
 /// The stream overwrites what nobody read. A reader that polls more often than the ring fills loses nothing; one that does
-/// not gets what is in the ring when it comes back, and cannot tell: frames carry a check sum for that.
+/// not gets what is in the ring when it comes back, and cannot detect it: frames carry a check sum for that.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DmaRing<const N: usize> {
     next: usize,

@@ -23,7 +23,7 @@ const SETTINGS: [(u32, u32); 16] = [
     (32, 8),
 ];
 
-/// Settings below this sample the timer's clock, whatever CKD says.
+/// Settings below this sample the timer's clock, independent of CKD.
 const UNDIVIDED: usize = 4;
 
 /// A timer's filter: the value of ICxF, and what it does.

@@ -109,7 +109,7 @@ impl<'b> Records<'b> {
 /// Takes stored settings over the default ones, checks the whole with `elements` the room for GMS elements, and returns
 /// their provenance.
 ///
-/// Settings that are stored and unknown here, and those that are missing there, are told to `report`.
+/// Settings that are stored and unknown here, and those that are missing there, are passed to `report`.
 ///
 /// # Errors
 /// Bytes that are no settings, a value of another type, or settings that are refused as a whole; `settings` are the

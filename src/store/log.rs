@@ -1,4 +1,4 @@
-//! Items in two sectors, the newest of which survives whatever happens while another is written.
+//! Items in two sectors, the newest of which survives every interruption while another is written.
 //!
 //! sequential-storage lays the items out in each sector, as a queue of one page, with their checksums; every item starts
 //! with a sequence number, and the one with the highest is the newest. The rule that keeps it: words are written only
@@ -178,7 +178,7 @@ impl<F: SettingsFlash> Log<F> {
 
     /// Reads the newest item into the buffer, its sequence number first; nothing, if the flash is blank.
     ///
-    /// Items are written one behind the other, and a sector is erased only when the other one is full. So whatever stands
+    /// Items are written one behind the other, and a sector is erased only when the other one is full. So the bytes
     /// behind the newest item, or in the other sector where no item can be read, may be the remains of a newer one.
     pub(super) fn read(&mut self, buffer: &mut [u8]) -> Result<Option<Newest>, LogError<F::Error>> {
         let Some((place, other_is_read)) = self.newest(buffer)? else {
@@ -238,7 +238,7 @@ impl<F: SettingsFlash> Log<F> {
         Ok(Err(LogError::NotKept))
     }
 
-    /// Erases a sector that holds no item that can be read, unless it is blank: what is there could be taken for the remains
+    /// Erases a sector that holds no item that can be read, unless it is blank: its content could be taken for the remains
     /// of a newer one.
     fn clear_remains(&mut self, sector: u32, buffer: &mut [u8]) -> Result<(), LogError<F::Error>> {
         if self.scan(sector, buffer, None)?.is_some() || self.is_blank_from(sector, 0)? {

@@ -44,7 +44,7 @@ pub enum SaveError<E> {
     Log(LogError<E>),
 }
 
-/// Reason why stored settings were not taken over. They stay where they are, and the settings are the default ones.
+/// Reason why stored settings were not adopted. They stay where they are, and the settings are the default ones.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LoadError<E> {
     /// They are not understood, or not valid.
@@ -136,7 +136,7 @@ impl<F: SettingsFlash> Store<F> {
         }
     }
 
-    /// Reads the newest settings that can be read; `None`, and the default ones, if the flash is blank. `report` is told what
+    /// Reads the newest settings that can be read; `None`, and the default ones, if the flash is blank. `report` receives what
     /// of them this firmware does not know, and what they lack. See [`Loaded::is_newest`].
     ///
     /// # Errors

@@ -77,7 +77,7 @@ impl FromStr for Shard {
 }
 
 impl Campaign {
-    /// The results of the seeds that are `wanted`: those that stand in the file of results, and those of the others, which are
+    /// The results of the seeds for which `is_requested`: those that stand in the file of results, and those of the others, which are
     /// `judge`d and appended to it.
     ///
     /// # Errors
@@ -86,7 +86,7 @@ impl Campaign {
         &self,
         results: &Path,
         title: &'static str,
-        is_wanted: impl Fn(u64) -> bool,
+        is_requested: impl Fn(u64) -> bool,
         judge: impl Fn(u64) -> L + Sync,
     ) -> anyhow::Result<BTreeMap<u64, L>> {
         if !self.merge.is_empty() {
@@ -106,11 +106,11 @@ impl Campaign {
             index,
             count: shards,
         } = self.shard;
-        let wanted: Vec<u64> = (first..first + count)
+        let requested: Vec<u64> = (first..first + count)
             .filter(|seed| (seed - first) % shards == index - 1)
-            .filter(|&seed| is_wanted(seed))
+            .filter(|&seed| is_requested(seed))
             .collect();
-        let missing: Vec<u64> = wanted
+        let missing: Vec<u64> = requested
             .iter()
             .copied()
             .filter(|seed| !lines.contains_key(seed))
@@ -142,7 +142,7 @@ impl Campaign {
             let line = line?;
             lines.insert(line.seed(), line);
         }
-        lines.retain(|seed, _| wanted.contains(seed));
+        lines.retain(|seed, _| requested.contains(seed));
         if lines.is_empty() {
             bail!("no seed is left to run");
         }

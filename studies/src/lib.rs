@@ -13,7 +13,7 @@
 //! - [`learning`]: other starts, part programs and changes, with the feedforward that learns;
 //! - [`cuts`]: learning under random cuts and changes of friction;
 //! - [`random_axes`]: commissioning of axes that are not the simulated stage's;
-//! - [`random_faults`]: faults at random activities, and what must hold whatever happens;
+//! - [`random_faults`]: faults at random activities, and what must hold in every case;
 //! - [`campaign`]: a result from each of many seeds, for the last three;
 //! - [`report`]: all of the first five and the circle test in one page, kept part by part.
 #![forbid(unsafe_code)]

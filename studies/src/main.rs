@@ -25,8 +25,8 @@ enum Command {
     Axes(random_axes::command::Arguments),
     /// Run learning under random cuts while friction changes, and compare it with no feedforward, 2 s by 2 s.
     Cuts(cuts::command::Arguments),
-    /// Run the firmware's tasks through random faults at random activities, and hold them against what must be so whatever
-    /// happens.
+    /// Run the firmware's tasks through random faults at random activities, and check what must hold in every
+    /// case.
     Faults(random_faults::command::Arguments),
     /// Compare the friction models on the same motions: loops, memory, drift, lag.
     Friction(friction_models::command::Arguments),

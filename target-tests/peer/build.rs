@@ -1,4 +1,4 @@
-//! Compiles the law in C, and tells the linker about it and about the emulated board.
+//! Compiles the law in C, and gives the linker it and the emulated board's files.
 
 use std::path::PathBuf;
 use std::process::Command;

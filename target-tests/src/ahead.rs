@@ -10,7 +10,7 @@ use quadrant_law::stage::Outputs;
 
 use crate::reference_model::{ReferenceModel, Tally};
 
-/// Ticks handed over at a time.
+/// Ticks passed at a time.
 const BATCH: u32 = 512;
 
 /// A firmware that answers ticks in their order.
@@ -23,13 +23,13 @@ pub(crate) trait Firmware {
     fn answers(&mut self) -> Result<Vec<Outputs>>;
 }
 
-/// Runs both for `ticks` ticks and compares all words; `told` is called after each comparison with the ticks compared so
+/// Runs both for `ticks` ticks and compares all words; `on_compared` is called after each comparison with the ticks compared so
 /// far.
 pub(crate) fn run<F: Firmware>(
     model: &mut ReferenceModel,
     firmware: &mut F,
     ticks: u32,
-    mut told: impl FnMut(&mut F, u32) -> Result<()>,
+    mut on_compared: impl FnMut(&mut F, u32) -> Result<()>,
 ) -> Result<Tally> {
     let mut tally = Tally::default();
     let mut expected = VecDeque::new();
@@ -55,7 +55,7 @@ pub(crate) fn run<F: Firmware>(
             compared += 1;
             tally.add(compared, expected, answer);
         }
-        told(firmware, compared)?;
+        on_compared(firmware, compared)?;
     }
     Ok(tally)
 }
@@ -117,13 +117,13 @@ mod tests {
             room: 1300,
             left: answered,
         };
-        let mut told = 0;
+        let mut last = 0;
         let tally = run(&mut model(), &mut firmware, 5000, |_, tick| {
-            assert!(told < tick);
-            told = tick;
+            assert!(last < tick);
+            last = tick;
             Ok(())
         });
-        tally.inspect(|_| assert_eq!(told, 5000))
+        tally.inspect(|_| assert_eq!(last, 5000))
     }
 
     #[test]

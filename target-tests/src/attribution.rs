@@ -25,7 +25,7 @@ impl Attribution {
         })
     }
 
-    /// The stage of the instruction at an address, if its own frames tell.
+    /// The stage of the instruction at an address, if its own frames show it.
     pub(crate) fn stage(&mut self, address: u32) -> Result<Option<&'static str>> {
         if let Some(stage) = self.known.get(&address) {
             return Ok(*stage);

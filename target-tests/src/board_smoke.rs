@@ -21,19 +21,23 @@ const MACHINE: &str = "netduinoplus2";
 /// RCC and PWR: what the clock set-up waits for.
 const CLOCK_REGISTERS: [std::ops::Range<u32>; 2] =
     [0x4002_3800..0x4002_3C00, 0x4000_7000..0x4000_7400];
-/// Instructions that are looked at for a wait, and how often to look before giving up.
+/// Instructions that are examined for a wait.
 const INSTRUCTIONS: usize = 40;
+/// Largest number of looks.
 const LOOKS: usize = 40;
-/// Control ticks to run, and how often the supervising task and the server run in them at least.
+/// Control ticks to run.
 const TICKS: u32 = 100;
+/// Least number of runs of the supervising task and the server in them.
 const POLLS: u32 = 9;
 /// Timeout of the first tick, in the host's time: settings are built before it, with interrupts masked.
 const TIMEOUT: Duration = Duration::from_secs(30);
-/// NVIC_ISPR1, and TIM7 in it.
+/// Address of NVIC_ISPR1.
 const SET_PENDING: u32 = 0xE000_E204;
+/// Bit of TIM7 in it.
 const TIM7: u32 = 1 << (55 - 32);
-/// `str r0, [r1]` and a branch to itself, at the bottom of the stack, where nobody is.
+/// `str r0, [r1]` and a branch to itself.
 const PEND: [u8; 4] = [0x08, 0x60, 0xFE, 0xE7];
+/// Address of these instructions: the bottom of the stack, which is unused.
 const SCRATCH: u32 = 0x2000_0000;
 /// Lines that the log must have: the converter's memory holds zero instead of an answer, the flash was found empty and the board not
 /// commissioned, initialisation came to its end; and that a full stack ended it.
@@ -50,6 +54,7 @@ const FORBIDDEN: [&str; 2] = ["outputs enabled", "request refused"];
 
 /// The sectors of the settings, which are to be found erased: QEMU's flash is all zeros, and that is damaged.
 const SETTINGS: (u32, usize) = (0x0800_4000, 32 * 1024);
+/// Byte of an erased sector.
 const ERASED: u8 = 0xFF;
 /// File with what erased flash reads as.
 const ERASED_FILE: &str = "target/xtask/erased-flash.bin";
@@ -241,7 +246,7 @@ impl Log {
         })
     }
 
-    /// Takes what is there, as a probe does.
+    /// Takes the bytes that have come, as a probe does.
     fn read(&mut self, debugger: &mut Debugger) -> Result<()> {
         let buffer = debugger.word(self.channel + 4)?;
         let size = debugger.word(self.channel + 8)?;
@@ -273,7 +278,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn loads_are_told_from_other_instructions() {
+    fn loads_are_distinguished_from_other_instructions() {
         // ldr r2, [r1, #4]; ldr.w r12, [r3, #64]; ldr.w r0, [r4, #-8]; movs r0, #1; str r0, [r1].
         assert_eq!(decode_load(0x684A, 0), Some((2, 1, 4)));
         assert_eq!(decode_load(0xF8D3, 0xC040), Some((12, 3, 64)));

@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_loop_is_told_from_a_jump_back_to_code_that_was_passed_over() {
+    fn a_loop_is_distinguished_from_a_jump_back_to_skipped_code() {
         let graph = |edges: &[(u32, &[u32])]| {
             edges
                 .iter()

@@ -4,7 +4,7 @@
 use xtask::image::Scalar;
 use xtask::listing::Instruction;
 
-/// Cycles that a change of the program counter adds: the pipeline is filled anew.
+/// Cycles that a change of the program counter adds: the pipeline is refilled.
 pub(crate) const REFILL: u32 = 3;
 /// Cycles from an exception to its first instruction, and from its last one back, with all floating-point registers saved.
 pub(crate) const ENTRY_AND_RETURN: u32 = 29 + 27;

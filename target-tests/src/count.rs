@@ -16,7 +16,7 @@ use xtask::toolchain::Toolchain;
 
 /// Tolerance about the expected count, %: a count that falls by more may have left something out.
 const TOLERANCE_PERCENT: f64 = 5.0;
-/// Difference that is borne however small a count is.
+/// Difference that is allowed for the smallest count.
 const TOLERANCE: f64 = 3.0;
 
 /// Instructions per tick of one stage or of all.
@@ -40,10 +40,10 @@ struct Count {
 /// File of the expected counts.
 const GOLDEN: Golden = Golden {
     path: golden::INSTRUCTIONS,
-    head: "Written by `cargo xtask count --overwrite-expected`; `cargo xtask count` holds its figures against these.",
+    head: "Written by `cargo xtask count --overwrite-expected`; `cargo xtask count` compares its figures with these.",
 };
 
-/// Counts the usual ticks stage by stage, and every other kind; prints, and holds the figures against the committed ones.
+/// Counts the usual ticks stage by stage, and every other kind; prints, and compares the figures with the committed ones.
 pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: bool) -> Result<()> {
     let image = emulated(toolchain, scalar)?;
     let kinds = Kinds::traced(&image, ticks)?;
@@ -76,7 +76,7 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: b
         .try_for_each(|(key, count)| compare(key, count, &image.compiler))
 }
 
-/// Counts some jobs, prints a line for each, and holds the figures against the committed ones.
+/// Counts some jobs, prints a line for each, and compares the figures with the committed ones.
 pub(crate) fn run_all(
     toolchain: Toolchain,
     scalar: Scalar,
@@ -166,10 +166,10 @@ fn compare(key: &str, count: &Count, compiler: &str) -> Result<()> {
     };
     let held = |name: &str, counted: f64, expected: f64| {
         let change = 100.0 * (counted / expected - 1.0);
-        let bears = (counted - expected).abs() <= TOLERANCE || change.abs() <= TOLERANCE_PERCENT;
-        difference.ensure(bears, || {
+        let allowed = (counted - expected).abs() <= TOLERANCE || change.abs() <= TOLERANCE_PERCENT;
+        difference.ensure(allowed, || {
             format!(
-                "{key}: {name} {counted} in place of {expected}, {change:+.1} %, more than {TOLERANCE_PERCENT} %; if that is wanted, \
+                "{key}: {name} {counted} in place of {expected}, {change:+.1} %, more than {TOLERANCE_PERCENT} %; if that is intended, \
                  `cargo xtask count --overwrite-expected` accepts it"
             )
         })

@@ -18,12 +18,15 @@ use xtask::image::{Image, Scalar};
 use xtask::listing::{Instruction, Listing};
 use xtask::toolchain::Toolchain;
 
-/// Clock of the reference board's processor, and the wait states of its flash at that clock (RM0390, table 5).
+/// Clock of the reference board's processor, Hz.
 const CORE_HZ: f64 = 180e6;
+/// Wait states of its flash at that clock (RM0390, table 5).
 const WAIT_STATES: u32 = 5;
-/// Bytes that the flash gives at once, and the lines that the accelerator before it keeps, of code and of literals (RM0390, 3.4.2).
+/// Bytes that the flash returns at a time (RM0390, 3.4.2).
 const LINE_BYTES: u32 = 16;
+/// Lines of code that the accelerator keeps.
 const CODE_LINES: usize = 64;
+/// Lines of literals that it keeps.
 const LITERAL_LINES: usize = 8;
 
 /// Control rate for which the share of the processor is printed, Hz.
@@ -37,7 +40,7 @@ const NO_CACHE_TOLERANCE_PERCENT: f64 = 20.0;
 /// File of the expected bounds.
 const GOLDEN: Golden = Golden {
     path: golden::CYCLES,
-    head: "Written by `cargo xtask cycles --overwrite-expected`; `cargo xtask cycles` holds its figures against these.",
+    head: "Written by `cargo xtask cycles --overwrite-expected`; `cargo xtask cycles` compares its figures with these.",
 };
 
 /// Bounds of any tick, in cycles.
@@ -49,7 +52,7 @@ struct Bounds {
     no_cache: f64,
 }
 
-/// Prints cycles by kind of tick and their bounds, and holds these against the committed ones.
+/// Prints cycles by kind of tick and their bounds, and compares these with the committed ones.
 pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: bool) -> Result<()> {
     let image = emulated(toolchain, scalar)?;
     let code = Code::of(&image, scalar)?;
@@ -148,12 +151,12 @@ fn compare(key: &str, bounds: Bounds, compiler: &str) -> Result<()> {
     println!(
         "  {key}: {grown:+.1} % against the committed bound, {no_cache_grown:+.1} % without a cache"
     );
-    let bears =
+    let allowed =
         grown.abs() <= TOLERANCE_PERCENT && no_cache_grown.abs() <= NO_CACHE_TOLERANCE_PERCENT;
-    difference.ensure(bears, || {
+    difference.ensure(allowed, || {
         format!(
             "{key}: the bound has changed by {grown:+.1} %, without a cache by {no_cache_grown:+.1} %, more than {TOLERANCE_PERCENT} or \
-             {NO_CACHE_TOLERANCE_PERCENT} %; if that is wanted, `cargo xtask cycles --overwrite-expected` accepts it"
+             {NO_CACHE_TOLERANCE_PERCENT} %; if that is intended, `cargo xtask cycles --overwrite-expected` accepts it"
         )
     })
 }

@@ -20,24 +20,26 @@ use xtask::image::Image;
 /// Ticks of one kind, one after the other.
 type Kind = (&'static str, Vec<Tick>);
 
-/// Ticks of a stream from one set point to the next, and its set points: as many as there is room for.
+/// Ticks of a stream from one set point to the next.
 const STREAM_TICKS: u16 = 50;
+/// Set points of a stream: as many as there is room for.
 const SET_POINTS: u32 = 15;
 /// Distance that the stream goes and comes back, mm.
 const STREAM_MM: f64 = 0.25;
 /// Ticks of the stream that are traced.
 const STREAMED: u32 = 250;
-/// Ticks from the end of a segment on that are of the change: the next one is taken over, and then the one after it from the queue.
+/// Ticks from the end of a segment on that are of the change: the next one is adopted, and then the one after it from the queue.
 const CHANGE_TICKS: u32 = 2;
 
 /// Velocity at whose crossing a capture triggers, mm/s.
 const TRIGGER_MM_S: f64 = 15.0;
-/// Share of the capture that comes before its trigger, %, and ticks from the trigger on until it is full: the rest of 256.
+/// Share of the capture that comes before its trigger, %.
 const BEFORE_PERCENT: u8 = 99;
+/// Ticks from the trigger on until the capture is full: the rest of 256.
 const FILLING_TICKS: u32 = 3;
-/// Velocities of the stage at which tracing begins, mm/s, with the ticks traced: the motion loses 0.09 mm/s a tick, and its
-/// reference is a dead time, some 13 ticks, ahead.
+/// Velocity at which tracing of a trigger begins, mm/s, and the ticks traced: the motion loses 0.09 mm/s a tick.
 const BEFORE_TRIGGER: (f64, u32) = (TRIGGER_MM_S + 3.0, 50);
+/// The same of a reversal: its reference is a dead time, some 13 ticks, ahead.
 const BEFORE_REVERSAL: (f64, u32) = (3.0, 200);
 /// Ticks of a controlled stop that are traced.
 const STOPPED: u32 = 50;

@@ -34,13 +34,13 @@ const OUTPUT: &str =
     "<quadrant_firmware::board::mps2::Amplifiers as quadrant::hal::Amplifiers>::write";
 const STORE: &str = "core::ptr::write_volatile";
 
-/// Growth of the spread that is borne, %.
+/// Growth of the spread that is allowed, %.
 const TOLERANCE_PERCENT: f64 = 5.0;
 
 /// File of the expected spread.
 const GOLDEN: Golden = Golden {
     path: golden::JITTER,
-    head: "Written by `cargo xtask saturation --overwrite-expected`; `cargo xtask saturation` holds its figures against these.",
+    head: "Written by `cargo xtask saturation --overwrite-expected`; `cargo xtask saturation` compares its figures with these.",
 };
 
 /// Instructions from the interrupt's entry to the first converter word, that one included.
@@ -57,7 +57,7 @@ impl Latency {
     }
 }
 
-/// Counts, prints, and holds the spread against the committed one.
+/// Counts, prints, and compares the spread with the committed one.
 pub(crate) fn run(image: &Image, overwrite: bool) -> Result<()> {
     let counts = count(image)?;
     let mean = counts.iter().copied().map(f64::from).sum::<f64>() / f64::from(TICKS);
@@ -87,7 +87,7 @@ pub(crate) fn run(image: &Image, overwrite: bool) -> Result<()> {
     println!("  {key}: {growth:+.1} % against the committed spread");
     difference.ensure(growth.abs() <= TOLERANCE_PERCENT, || {
         format!(
-            "{key}: the jitter has changed by {growth:+.1} %, more than {TOLERANCE_PERCENT} %; if that is wanted, \
+            "{key}: the jitter has changed by {growth:+.1} %, more than {TOLERANCE_PERCENT} %; if that is intended, \
              `cargo xtask saturation --overwrite-expected` accepts it"
         )
     })

@@ -56,7 +56,7 @@ enum Verb {
     Emulate(EmulateArgs),
     /// Start the reference board's image in QEMU's model of a near relative of its chip
     BoardSmoke,
-    /// Inject every fault into the emulated firmware, and tell how it was found
+    /// Inject every fault into the emulated firmware, and report how it was found
     Faults(FaultArgs),
     /// Count the instructions of one control tick, by stage and by kind of tick
     Count {
@@ -77,7 +77,7 @@ enum Verb {
         /// The firmware's number type
         #[arg(long, value_enum, default_value_t = Scalar::F32)]
         scalar: Scalar,
-        /// Write the jitter to the file that later runs are held against
+        /// Write the jitter to the file with which later runs are compared
         #[arg(long)]
         overwrite_expected: bool,
     },
@@ -109,7 +109,7 @@ struct FaultArgs {
     /// Only this one, by its name
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
-    /// Write the table to the file that later runs are held against
+    /// Write the table to the file with which later runs are compared
     #[arg(long)]
     overwrite_expected: bool,
 }
@@ -123,7 +123,7 @@ struct CountArgs {
     /// Control ticks to run
     #[arg(long, default_value_t = 250)]
     ticks: u32,
-    /// Write the figures to the file that later runs are held against
+    /// Write the figures to the file with which later runs are compared
     #[arg(long)]
     overwrite_expected: bool,
 }
@@ -137,7 +137,7 @@ struct CombinationArgs {
     /// Control ticks to count in each run; 0 leaves counting out
     #[arg(long, default_value_t = 60)]
     ticks: u32,
-    /// Write the figures to the file that later runs are held against
+    /// Write the figures to the file with which later runs are compared
     #[arg(long)]
     overwrite_expected: bool,
 }

@@ -143,7 +143,7 @@ impl Tracer {
     }
 
     fn switch_on(&mut self) -> Result<()> {
-        // Unchained code is translated anew, and so listed.
+        // Unchained code is translated again, and so listed.
         self.debugger.monitor("log exec,nochain,in_asm")?;
         self.debugger.resume()
     }

@@ -76,7 +76,7 @@ fn a_sagging_supply_reads_as_amplifiers_that_are_not_ready() {
 }
 
 #[test]
-fn the_more_special_flag_tells_the_cause_of_a_reset() {
+fn the_more_special_flag_names_the_cause_of_a_reset() {
     let pin = 1 << 26;
     let cases = [
         (0, ResetCause::Unknown),

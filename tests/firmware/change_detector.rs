@@ -39,7 +39,7 @@ fn a_machine_at_rest_is_no_news() {
 }
 
 #[test]
-fn homing_is_told_from_its_beginning_to_its_end() {
+fn homing_is_reported_from_its_beginning_to_its_end() {
     let mut machine = Machine::default();
     machine.view.modes[1] = MotionMode::Home;
     assert_eq!(
@@ -53,7 +53,7 @@ fn homing_is_told_from_its_beginning_to_its_end() {
 }
 
 #[test]
-fn homing_that_finds_nothing_is_told_too() {
+fn homing_that_finds_nothing_is_reported_too() {
     let mut machine = Machine::default();
     machine.view.modes[2] = MotionMode::Home;
     machine.compare();
@@ -73,26 +73,26 @@ fn homing_that_finds_nothing_is_told_too() {
 }
 
 #[test]
-fn a_host_is_told_when_it_comes_falls_silent_and_comes_back() {
+fn a_host_is_reported_when_it_comes_falls_silent_and_comes_back() {
     let mut machine = Machine {
         tick: 50_000,
         ..Machine::default()
     };
     machine.server.greeted = true;
-    machine.server.heard_tick = 50_000;
+    machine.server.request_tick = 50_000;
     assert_eq!(machine.compare(), [StateChange::Greeted]);
     machine.tick = 80_000;
     assert_eq!(machine.compare(), []);
     machine.tick = 80_001;
     assert_eq!(machine.compare(), [StateChange::Silent]);
     machine.tick = 200_000;
-    assert_eq!(machine.compare(), [], "silence is told once");
-    machine.server.heard_tick = 200_000;
+    assert_eq!(machine.compare(), [], "silence is reported once");
+    machine.server.request_tick = 200_000;
     assert_eq!(machine.compare(), [StateChange::Back]);
 }
 
 #[test]
-fn losses_are_told_by_how_much_they_grew() {
+fn losses_are_reported_by_how_much_they_grew() {
     let mut machine = Machine::default();
     machine.server.bad_frames = 3;
     machine.server.dropped_samples = 10;
@@ -132,7 +132,7 @@ fn losses_are_told_by_how_much_they_grew() {
 }
 
 #[test]
-fn settings_and_captures_are_told_once() {
+fn settings_and_captures_are_reported_once() {
     let mut machine = Machine::default();
     machine.server.applied = 1;
     machine.server.stored = 1;
@@ -156,7 +156,7 @@ fn all_at_once_finds_room() {
     machine.view.modes = PerAxis::splat(MotionMode::Stopping);
     machine.server = ServerStatistics {
         greeted: true,
-        heard_tick: 0,
+        request_tick: 0,
         bad_frames: 1,
         dropped_samples: 1,
         dropped_events: 1,

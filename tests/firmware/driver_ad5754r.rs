@@ -23,7 +23,7 @@ fn ns(cycles: u64) -> f64 {
 /// A frame that ended, and the cycle at which it did.
 type Frame = (u64, [u8; 3]);
 
-/// The chip: what it sees at its pins, and what it minds.
+/// The chip: what it sees at its pins, and what it rejects.
 struct Chip {
     selected: bool,
     sync_changed: u64,
@@ -41,8 +41,8 @@ struct Chip {
     codes: [u16; 3],
     power: u16,
     range: u16,
-    minded: Vec<String>,
-    /// It hears nothing and answers ones.
+    rejected: Vec<String>,
+    /// It receives nothing and answers ones.
     is_missing: bool,
     /// Bits of an answer that are wrong, by the register asked for.
     wrong: Option<(u8, u16)>,
@@ -64,7 +64,7 @@ impl Chip {
             codes: [0; 3],
             power: 0,
             range: 0,
-            minded: Vec::new(),
+            rejected: Vec::new(),
             is_missing: false,
             wrong: None,
         }
@@ -73,7 +73,7 @@ impl Chip {
     fn at_least(&mut self, what: &str, cycles: u64, least_ns: f64) {
         if ns(cycles) < least_ns {
             let words = format!("{what}: {:.0} ns instead of {least_ns}", ns(cycles));
-            self.minded.push(words);
+            self.rejected.push(words);
         }
     }
 
@@ -130,7 +130,7 @@ impl Chip {
         (self.selected, self.sync_changed) = (false, now);
         if self.bits.len() != 24 {
             let words = format!("a frame of {} bits", self.bits.len());
-            self.minded.push(words);
+            self.rejected.push(words);
             return;
         }
         let mut frame = [0; 3];
@@ -278,8 +278,9 @@ struct Bench {
     clear: Pin,
 }
 
-/// A control period at 10 kHz, and the share of it between the beginning of a tick and its write, in cycles.
+/// Control period at 10 kHz, in cycles.
 const PERIOD: u64 = 18_000;
+/// Cycles between the beginning of a tick and its write.
 const COMPUTING: u64 = 5_000;
 
 type Outcome = Result<(), Error<Stuck>>;
@@ -341,9 +342,12 @@ impl Bench {
         written
     }
 
-    /// Ends it: nothing was minded, and /CLR took all its levels.
+    /// Ends it: nothing was rejected, and /CLR took all its levels.
     fn done(mut self) {
-        assert_eq!(self.chip(|chip| chip.minded.clone()), Vec::<String>::new());
+        assert_eq!(
+            self.chip(|chip| chip.rejected.clone()),
+            Vec::<String>::new()
+        );
         self.clear.done();
     }
 }
@@ -486,12 +490,12 @@ fn a_step_that_is_shorter_by_more_than_half_a_bit_is_minded() {
         let _ = bench.tick_after([tick; 3], COMPUTING);
         bench.pass(PERIOD);
     }
-    let minded = bench.chip(|chip| std::mem::take(&mut chip.minded));
+    let rejected = bench.chip(|chip| std::mem::take(&mut chip.rejected));
     assert!(
-        minded
+        rejected
             .iter()
             .any(|words| words.starts_with("clock to /SYNC")),
-        "{minded:?}"
+        "{rejected:?}"
     );
     bench.done();
 }
@@ -560,8 +564,8 @@ fn every_wrong_bit_of_every_register_is_reported_and_the_codes_are_written_all_t
     let codes = [100, 200, 300];
     for (address, item, expected, bits) in registers {
         for bit in 0..16 {
-            let minds = bits >> bit & 1 == 1;
-            let levels: &[State] = if minds { &[State::Low] } else { &[] };
+            let rejects = bits >> bit & 1 == 1;
+            let levels: &[State] = if rejects { &[State::Low] } else { &[] };
             let mut bench = Bench::started(levels, none);
             for _ in 0..4 {
                 assert_eq!(bench.tick(codes), Ok(()));
@@ -574,7 +578,7 @@ fn every_wrong_bit_of_every_register_is_reported_and_the_codes_are_written_all_t
                 answered: expected ^ 1 << bit,
             };
             let reported = found.iter().filter(|found| **found == Err(error)).count();
-            assert_eq!(reported > 0, minds, "bit {bit} of {item:?}: {found:?}");
+            assert_eq!(reported > 0, rejects, "bit {bit} of {item:?}: {found:?}");
             assert_eq!(bench.chip(|chip| chip.codes), [100, 200, 300]);
             bench.done();
         }

@@ -47,7 +47,7 @@ fn a_press_that_is_too_short_is_none() {
 }
 
 proptest! {
-    /// Whatever the contacts do: enabled and disabled alternate, and enabling takes the whole time up and down before.
+    /// With any sequence of the contacts: enabled and disabled alternate, and enabling takes the whole time up and down before.
     #[test]
     fn bouncing_never_enables_twice(bounces in prop::collection::vec(any::<(bool, u8)>(), 0..60)) {
         let runs: Vec<_> = bounces.iter().map(|&(down, ticks)| (down, usize::from(ticks))).collect();

@@ -57,7 +57,7 @@ proptest! {
         }
     }
 
-    /// Whatever the stream's register shows, nothing outside the ring is read and the call ends.
+    /// With any content of the stream's register, nothing outside the ring is read and the call ends.
     #[test]
     fn a_ring_survives_a_broken_register(remainders in prop::collection::vec(any::<usize>(), 1..50)) {
         let mut reader = DmaRing::<16>::new();

@@ -11,7 +11,9 @@ use quadrant_law::units::Position;
 const RESOLUTION_MM: f64 = 5e-4;
 /// Control rate, Hz.
 const RATE_HZ: f64 = 1e4;
+/// Radius of the circle, mm.
 const RADIUS_MM: f64 = 15.0;
+/// Turns of the circle in a second, Hz.
 const FREQUENCY_HZ: f64 = 0.5;
 /// Error between the spikes, mm.
 const LEVEL_MM: f64 = 0.8e-3;

@@ -102,7 +102,7 @@ fn a_stream_takes_the_place_of_one_that_never_began() {
     tasks
         .ask(points(0, &[0.5, 1.0, 1.5], false))
         .expect("takes the points");
-    // Set points that are refused end nothing, and the client begins anew.
+    // Set points that are refused end nothing, and the client begins again.
     assert!(tasks.ask(points(3, &[900.0], false)).is_err());
     tasks.ask(open()).expect("opens");
     tasks

@@ -183,7 +183,7 @@ fn a_machine_is_driven_while_it_homes_works_and_brakes_and_rests_between() {
 }
 
 #[test]
-fn events_and_states_of_learning_are_told_in_words() {
+fn events_and_states_of_learning_are_reported_in_words() {
     let friction = |percent, needs_maintenance| Event::FrictionChanged {
         axis: AxisName::X,
         percent,

@@ -154,7 +154,7 @@ fn homing_goes_on_alone_if_the_settings_say_so() {
 }
 
 #[test]
-fn a_host_is_lost_half_a_second_after_the_tick_that_heard_it_last() {
+fn a_host_is_lost_half_a_second_after_the_tick_of_its_last_request() {
     let mut tasks = tasks(|_| {});
     tasks.ask(Body::Enable).expect("enables");
     tasks.run(40);
@@ -164,13 +164,13 @@ fn a_host_is_lost_half_a_second_after_the_tick_that_heard_it_last() {
     };
     tasks.ask(jog).expect("jogs");
     tasks.run(10);
-    // Received by the run of the supervising task in tick `heard` - 1, and counted by the next.
-    let heard = tasks.tick() + 10;
+    // Received by the run of the supervising task in tick `received` - 1, and counted by the next.
+    let received = tasks.tick() + 10;
     tasks.send(&[Body::Status]);
     tasks.run(2 * LINK_TIMEOUT_TICKS);
     let fault = safety(&tasks).fault().expect("latched");
     assert_eq!(fault.code, FaultCode::LinkLost);
-    assert_eq!(fault.tick - heard, LINK_TIMEOUT_TICKS + 1);
+    assert_eq!(fault.tick - received, LINK_TIMEOUT_TICKS + 1);
 }
 
 /// An injection of a few values with the plan, and then nobody asks anything.
@@ -244,13 +244,13 @@ fn a_host_counts_as_lost_after_half_a_second_at_every_control_rate() {
                 velocity_mm_s: 2.0,
             })
             .expect("jogs");
-        let heard = tasks.tick();
+        let received = tasks.tick();
         while safety(&tasks).is_enabled() {
             tasks.run(1);
         }
         let fault = safety(&tasks).fault().expect("latched");
         assert_eq!(fault.code, FaultCode::LinkLost);
-        let silent_s = f64::from(fault.tick - heard) / rate_hz;
+        let silent_s = f64::from(fault.tick - received) / rate_hz;
         assert!(
             (silent_s - 0.5).abs() < 0.02,
             "{silent_s} s at {rate_hz} Hz"

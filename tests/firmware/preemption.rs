@@ -133,7 +133,7 @@ fn enable_waits_for_the_settings_that_were_applied_before_it() {
     };
     assert!(tasks.ask(jog).is_err(), "the new limit is in force");
 
-    // Who asks to disable while it waits is heard.
+    // A request to disable is acted on while it waits.
     let mut tasks = Tasks::new(&settings(), 1);
     let first = tasks.send(&[slower(), apply(), Body::Enable, Body::Disable]);
     tasks.run(300);
@@ -276,7 +276,7 @@ fn settings_that_safety_depends_on_wait_for_the_outputs_to_be_off_whoever_enable
     let usual = sign(&mut tasks);
     tasks.ask(Body::Disable).expect("disables");
     tasks.run(3000);
-    // The operator enables in the tick before the server, which saw them off, hands the settings over.
+    // The operator enables in the tick before the server, which saw them off, passes the settings on.
     tasks.send(&turned_round());
     tasks.upper.borrow_mut().operate(Command::Enable);
     tasks.run(100);
@@ -306,7 +306,7 @@ fn nothing_enables_between_the_axes_of_one_change() {
         }
         tasks.send(&[Body::Settings(SettingsRequest::Apply)]);
         tasks.run(10 * polls);
-        // The server is held up with some axes handed over and others not.
+        // The server is held up with some axes passed on and others not.
         tasks.held_up = 50;
         tasks.run(10);
         tasks.upper.borrow_mut().operate(Command::Enable);
@@ -425,8 +425,8 @@ fn a_plan_is_exchanged_whole_or_refused() {
     assert_eq!(counts, [-60, -120, -180]);
 }
 
-/// The worst delay from the last byte of `Stop` or `Disable` at the board to the tick that acts on it, whatever the server
-/// does: one run of the supervising task, and the next tick.
+/// The worst delay from the last byte of `Stop` or `Disable` at the board to the tick that acts on it, in any state of the
+/// server: one run of the supervising task, and the next tick.
 const WORST_DELAY_TICKS: u32 = 11;
 
 #[test]
@@ -500,7 +500,7 @@ fn a_motion_without_an_end_stops_with_its_host_even_if_the_server_has_died() {
         let mut tasks = enabled();
         tasks.ask(endless()).expect("takes the plan");
         tasks.ask(Body::Run).expect("runs");
-        let heard = tasks.tick();
+        let received = tasks.tick();
         if !server_lives {
             tasks.held_up = u32::MAX;
         }
@@ -515,7 +515,7 @@ fn a_motion_without_an_end_stops_with_its_host_even_if_the_server_has_died() {
         let other_version = framed(&[9, 77, 1]);
         let no_request = framed(&[1, 77, 200]);
         let mut stopped = None;
-        while stopped.is_none() && tasks.tick() - heard < 3 * LINK_TIMEOUT_TICKS {
+        while stopped.is_none() && tasks.tick() - received < 3 * LINK_TIMEOUT_TICKS {
             for bytes in [&damaged, &other_version, &no_request, &vec![3, 0]] {
                 tasks.upper.borrow_mut().receive(bytes);
             }
@@ -526,7 +526,7 @@ fn a_motion_without_an_end_stops_with_its_host_even_if_the_server_has_died() {
         }
         let fault = stopped.expect("stops");
         assert_eq!(fault.code, FaultCode::LinkLost);
-        let silent = fault.tick - heard;
+        let silent = fault.tick - received;
         assert!(
             (LINK_TIMEOUT_TICKS - 20..=LINK_TIMEOUT_TICKS + 20).contains(&silent),
             "{silent} ticks"
@@ -543,7 +543,7 @@ fn a_host_that_asks_keeps_its_motion() {
     tasks.ask(Body::Run).expect("runs");
     for _ in 0..10 {
         tasks.run(LINK_TIMEOUT_TICKS / 2);
-        tasks.ask(Body::Status).expect("tells");
+        tasks.ask(Body::Status).expect("answers");
     }
     assert!(tasks.upper.borrow().state().is_running());
 }
@@ -586,7 +586,7 @@ fn invalid_settings_outlast_a_reset_until_others_are_stored() {
         tasks.ask(Body::ResetFault),
         Err(LinkError::Refused(_))
     ));
-    // The law decides, whoever asks.
+    // The law decides, for every station.
     tasks.upper.borrow_mut().inputs.command = Some(Command::ResetFault);
     tasks.run(20);
     tasks.upper.borrow_mut().inputs.command = None;

@@ -141,7 +141,7 @@ fn a_damaged_newest_set_is_noticed_wherever_it_lies() {
         let before = flash.clone();
         flash = save(flash, &numbered(number), ELEMENTS);
         assert!(is_newest(&flash), "after store {number}");
-        // But for the library's own marks at both ends of a sector, which bear a flipped bit.
+        // But for the library's own marks at both ends of a sector, which allow a flipped bit.
         let changed: Vec<usize> = (0..flash.bytes.len())
             .filter(|&at| flash.bytes[at] != before.bytes[at] && flash.bytes[at] != 0xFF)
             .filter(|&at| (4..SECTOR - 4).contains(&(at % SECTOR)))

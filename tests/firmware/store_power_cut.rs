@@ -9,7 +9,7 @@ use quadrant_test_support::Noise;
 
 const ELEMENTS: usize = 8;
 
-/// Settings that tell which store they are of, and are soon checked: without a plant there is no bound to search.
+/// Settings that name their store, and are soon checked: without a plant there is no bound to search.
 fn set(number: u32) -> StageSettings {
     let mut settings = StageSettings::simulated();
     for axis in &mut settings.axes {

@@ -309,7 +309,7 @@ fn another_format_is_refused() {
     assert_eq!(decoded(&[]), Err(DecodeError::Malformed));
 }
 
-/// Bytes of the first release: whatever comes later reads them. Beside them is what they say.
+/// Bytes of the first release: every later release reads them. Beside them is what they say.
 #[test]
 fn a_set_of_the_first_release_is_read() {
     let (settings, provenance, findings) =

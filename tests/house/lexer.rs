@@ -156,7 +156,7 @@ fn character_or_lifetime(rest: &str) -> usize {
 }
 
 #[test]
-fn comments_literals_and_lifetimes_are_told_apart() {
+fn comments_literals_and_lifetimes_are_distinguished() {
     let source = "/// doc\nfn f<'a>(c: &'a str) { g('\"', \"un\\\"safe\", r#\"a\"b\"#); } // unsafe\n/* unsafe */";
     let words = |kind| -> Vec<_> {
         tokens(source)

@@ -382,7 +382,7 @@ fn every_channel_has_its_row_on_the_page_of_the_link() {
 fn every_name_in_documentation_exists() {
     let known = known_words();
     report("names that do not exist", |text, span| {
-        // The change log tells of what was.
+        // The change log describes the past.
         if span.contains(['<', '>']) {
             return false;
         }

@@ -33,7 +33,7 @@ fn collect(folder: &Path, prefix: &str, extensions: &[&str], found: &mut BTreeMa
             }
         } else if extensions
             .iter()
-            .any(|wanted| path.extension().is_some_and(|is| is == *wanted))
+            .any(|extension| path.extension().is_some_and(|is| is == *extension))
         {
             let text = fs::read_to_string(&path).expect("text in UTF-8");
             found.insert(format!("{prefix}{name}"), text);

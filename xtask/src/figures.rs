@@ -120,7 +120,7 @@ const KINDS: [(&str, &str); 13] = [
     ),
     ("a stream, between two changes of segment", "stream"),
     (
-        "a segment has run out: the next one is taken over, and in the tick after it the one behind it from the queue",
+        "a segment has run out: the next one is adopted, and in the tick after it the one behind it from the queue",
         "segment change",
     ),
     (
@@ -128,7 +128,7 @@ const KINDS: [(&str, &str); 13] = [
         "capture triggers",
     ),
     (
-        "reversal: 20 ms, in which the elements stick and slip anew",
+        "reversal: 20 ms, in which the elements stick and slip again",
         "reversal",
     ),
     ("controlled stop", "stop"),
@@ -187,7 +187,7 @@ fn claims() -> Vec<(String, String)> {
         tick(format!("| {row} | {} | {} |", of("f32"), of("fixed")))
     });
     let enabling = tick(
-        "three memories begin anew | | {count: f32, enable.total.max} | | {count: fixed, enable.total.max} |"
+        "three memories begin again | | {count: f32, enable.total.max} | | {count: fixed, enable.total.max} |"
             .to_owned(),
     );
     let combinations = COMBINATIONS.iter().map(|(row, name)| {
@@ -207,7 +207,7 @@ fn claims() -> Vec<(String, String)> {
         .collect()
 }
 
-/// Holds the pages against the committed figures, or writes those into them.
+/// Compares the pages with the committed figures, or writes those into them.
 ///
 /// # Errors
 /// All that differs, and what a page no longer says.
@@ -242,7 +242,7 @@ pub(crate) fn run(overwrite: bool) -> Result<()> {
         for (page, content) in pages {
             fs::write(command::root().join(page), content)?;
         }
-        println!("{} of {} places written anew", wrong.len(), claims.len());
+        println!("{} of {} places rewritten", wrong.len(), claims.len());
         return Ok(());
     }
     ensure!(

@@ -1,4 +1,4 @@
-//! Figures that are committed, which later runs are held against.
+//! Figures that are committed, with which later runs are compared.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -113,7 +113,7 @@ impl Golden {
         let mut all = self.read()?;
         if all.compiler.as_deref() != compiler {
             if !all.tables.is_empty() {
-                println!("the figures of another compiler are dropped: record all of them anew");
+                println!("the figures of another compiler are dropped: record all of them again");
             }
             all.tables.clear();
             all.compiler = compiler.map(str::to_owned);

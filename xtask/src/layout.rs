@@ -1,8 +1,8 @@
 //! Place of an image in the machine's memories, and its sizes.
 //!
-//! Two promises of the linker scripts are held against the linked image: the stack is below everything else in RAM, so
+//! Two promises of the linker scripts are checked in the linked image: the stack is below everything else in RAM, so
 //! that growing too far is a fault and nothing worse; and flashing an image never touches the sectors of the stored
-//! settings. The sizes are held against those committed in `golden/sizes.toml`.
+//! settings. The sizes are compared with those committed in `golden/sizes.toml`.
 
 use std::ops::Range;
 
@@ -171,7 +171,7 @@ fn key(target: Target) -> String {
     target.to_string().replace(' ', "-")
 }
 
-/// Holds sizes against the committed ones: another one is a failure if the same compiler made both. Smaller is good news, or something
+/// Compares sizes with the committed ones: another one is a failure if the same compiler made both. Smaller is good news, or something
 /// that the tool has not seen.
 fn compare(target: Target, compiler: &str, sizes: Sizes) -> Result<()> {
     const REMEDY: &str = "if that is meant, run `cargo xtask sizes --overwrite-expected`";
@@ -185,8 +185,8 @@ fn compare(target: Target, compiler: &str, sizes: Sizes) -> Result<()> {
         ("stack", sizes.stack, expected.stack),
         ("stack bound", sizes.stack_bound, expected.stack_bound),
     ] {
-        let bears = size.abs_diff(expected) as f64 <= expected as f64 * TOLERANCE;
-        difference.ensure(bears, || {
+        let allowed = size.abs_diff(expected) as f64 <= expected as f64 * TOLERANCE;
+        difference.ensure(allowed, || {
             format!(
                 "{target}: {name} {size} bytes, more than {} % from the committed {expected}; {REMEDY}",
                 100.0 * TOLERANCE

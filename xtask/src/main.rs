@@ -53,7 +53,7 @@ enum Verb {
     ProveNoPanic(TargetArgs),
     /// Play a session through the console, on the simulated machine and on the emulated image
     Transcript {
-        /// Write what is printed to the files that later runs are held against
+        /// Write what is printed to the files with which later runs are compared
         #[arg(long)]
         overwrite_expected: bool,
     },
@@ -61,7 +61,7 @@ enum Verb {
     Emulate(Forwarded),
     /// Start the reference board's image in QEMU's model of a near relative of its chip
     BoardSmoke(Forwarded),
-    /// Inject every fault into the emulated firmware, and tell how it was found
+    /// Inject every fault into the emulated firmware, and report how it was found
     Faults(Forwarded),
     /// Count the instructions of one control tick, by stage and by kind of tick
     Count(Forwarded),
@@ -138,7 +138,7 @@ impl From<TargetArgs> for Target {
 struct SizeArgs {
     #[command(flatten)]
     target: TargetArgs,
-    /// Write the sizes to the file that later runs are held against
+    /// Write the sizes to the file with which later runs are compared
     #[arg(long)]
     overwrite_expected: bool,
     /// Print what takes how much of the flash, by module
@@ -161,7 +161,7 @@ fn main() -> ExitCode {
 
 /// Does what was asked for and returns whether it went well.
 fn run(cli: Cli) -> Result<bool> {
-    // Setup looks at what is there; everything else takes what setup chose.
+    // Setup looks at what is installed; everything else takes what setup chose.
     let toolchain = || Toolchain::chosen(cli.toolchain);
     match cli.verb {
         Verb::Setup { peer } => {

@@ -7,14 +7,14 @@ use object::{Object, ObjectSymbol, SymbolKind};
 
 use xtask::image::Image;
 
-/// Crates whose modules are told apart.
+/// Crates whose modules are distinguished.
 const OURS: [&str; 4] = [
     "quadrant",
     "quadrant_firmware",
     "quadrant_law",
     "quadrant_settings",
 ];
-/// The module whose modules are told apart in turn.
+/// The module whose modules are distinguished in turn.
 const LARGE: &str = "app";
 /// Smaller ones go together.
 const LEAST_BYTES: u64 = 1024;
@@ -65,7 +65,7 @@ pub(crate) fn print(image: &Image) -> Result<()> {
     Ok(())
 }
 
-/// The module of a function or constant: its path without its own name, cut to what is worth telling apart.
+/// The module of a function or constant: its path without its own name, cut to what is worth distinguishing.
 fn module(name: &str) -> String {
     if name.contains("miniconf::tree::TreeAny") {
         return "leaves of the settings by path (miniconf)".into();

@@ -21,9 +21,11 @@ const PERIOD_NS: f64 = 100_000.0;
 /// Largest difference of a position from ours, mm.
 const BOUND_MM: f64 = 1e-9;
 
-/// Names of the programs that are told apart.
+/// Name of the law's program.
 const OURS: &str = "Quadrant";
+/// Name of the program of the whole tick.
 const WHOLE: &str = "Quadrant, the whole tick";
+/// Name of the C++ program.
 const CPP: &str = "C++ (g++ -O3)";
 /// Rounds, of which the shortest time of each program counts.
 const ROUNDS: usize = 3;

@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn helpers_are_told_apart() {
+    fn helpers_are_distinguished() {
         assert_eq!(
             verdict("_ZN4core9panicking18panic_bounds_check17h0123456789abcdefE"),
             Some("panics")

@@ -257,7 +257,7 @@ fn refuse_unless_formatting(frames: &Frames, group: &[u32]) -> Result<()> {
     Ok(())
 }
 
-/// Holds the bound against the stack that an image sets aside.
+/// Compares the bound with the stack that an image sets aside.
 pub(crate) fn check(image: &Image) -> Result<u32> {
     let bytes = bound(image)?;
     let size = image.symbol("_stack_start")? - image.symbol("_stack_end")?;
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn calls_by_address_reach_what_is_there_to_be_called() {
+    fn calls_by_address_reach_every_callable_function() {
         let functions: [(&str, u32, &[u32], bool); 4] = [
             ("root", 8, &[], true),
             ("closure", 50, &[], false),

@@ -194,7 +194,7 @@ impl Beside {
         Ok(Self(child))
     }
 
-    /// Waits, prints what it said, and takes over its steps.
+    /// Waits, prints what it said, and adopts its steps.
     fn finish(mut self, report: &mut Report) -> Result<()> {
         let status = self.0.wait()?;
         let log = fs::read_to_string(command::root().join(FIRMWARE_LOG))?;

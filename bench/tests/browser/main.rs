@@ -12,8 +12,11 @@ use quadrant_chromium::Browser;
 
 /// Path of the built page.
 const PAGE: &str = "QUADRANT_BENCH_PAGE";
+/// Size of a phone's window, CSS pixels.
 const PHONE: (u32, u32) = (390, 844);
+/// Size of a tablet's window, CSS pixels.
 const TABLET: (u32, u32) = (768, 1024);
+/// Size of a desktop's window, CSS pixels.
 const DESK: (u32, u32) = (1440, 900);
 
 /// Control periods that are compared at once.

@@ -24,7 +24,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 const STOPPED_TICKS: u32 = 4000;
 /// Way of an axis at rest at most, mm: its law holds it against noise.
 const REST_MM: f64 = 0.01;
-/// Hides the page, and shows it again, as far as it can tell.
+/// Hides the page, and shows it again, as far as the page can detect it.
 const HIDE: &str = "Object.defineProperty(document, 'hidden', { configurable: true, get: () => true }); \
     document.dispatchEvent(new Event('visibilitychange'))";
 const SHOW: &str = "delete document.hidden; document.dispatchEvent(new Event('visibilitychange'))";
@@ -420,7 +420,7 @@ fn a_gain_is_found_set_compared_applied_and_stored() {
 
     wired.click("#m-apply");
     wired.wait_for("document.querySelectorAll('#m-differences tr').length === 0 && document.getElementById('m-message').textContent === 'acting now on x'");
-    wired.evaluate(&format!("machineView.ask({{ 'get-in-force': {{ path: '{PATH}' }} }}).then((told) => {{ window.acting = told.value; }}); 0"));
+    wired.evaluate(&format!("machineView.ask({{ 'get-in-force': {{ path: '{PATH}' }} }}).then((answer) => {{ window.acting = answer.value; }}); 0"));
     wired.wait_for("window.acting === 0.75");
     wired.evaluate("document.getElementById('m-origin').value = 'kp of x lowered'; document.getElementById('m-store').click()");
     wired.wait_for(
@@ -432,7 +432,7 @@ fn a_gain_is_found_set_compared_applied_and_stored() {
 
 #[test]
 #[ignore = "needs the built page: cargo xtask web --check"]
-fn a_held_port_a_silent_board_and_a_pulled_cable_are_told() {
+fn a_held_port_a_silent_board_and_a_pulled_cable_are_reported() {
     let Some(mut wired) = Wired::open(DESK, true) else {
         return;
     };
@@ -525,12 +525,12 @@ fn a_browser_without_serial_ports_says_what_to_do() {
     let mut address = page().into_os_string();
     address.push("?machine=serial");
     browser.open(address.as_ref(), PHONE, false);
-    let told = browser.evaluate(
+    let text = browser.evaluate(
         "new Promise((done) => { const look = () => (typeof machineView === 'object' ? done(document.body.innerText) : setTimeout(look, 20)); look(); })",
     );
     assert!(
-        told.as_str().unwrap().contains("Open this page in Chrome"),
-        "{told}"
+        text.as_str().unwrap().contains("Open this page in Chrome"),
+        "{text}"
     );
     assert_eq!(
         browser.evaluate("document.getElementById('m-connect').disabled"),

@@ -52,7 +52,7 @@ pub(super) struct Arguments {
     machine: Endpoint,
     #[command(flatten)]
     stage: OwnStage,
-    /// The folder of an earlier commissioning instead, whose recordings are identified anew; nothing moves, so there is no
+    /// The folder of an earlier commissioning instead, whose recordings are identified again; nothing moves, so there is no
     /// verdict and no cross-check.
     #[arg(long, value_name = "FOLDER")]
     record: Option<PathBuf>,
@@ -202,7 +202,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 impl Arguments {
-    /// Identifies the recordings of an earlier commissioning anew.
+    /// Identifies the recordings of an earlier commissioning again.
     fn run_saved(&self, folder: &Path, start: Option<SettingsFile>) -> anyhow::Result<()> {
         let Self { output, .. } = self;
         output.ready()?;
@@ -318,7 +318,7 @@ fn again(axis: AxisName, given: Travel, began_mm: f64, at_mm: f64) -> anyhow::Re
 
 impl Job<'_> {
     /// Commissions the axis, and writes everything that was found. The machine has its old settings afterwards unless the
-    /// new ones are to act, whatever came of it.
+    /// new ones are to act, also after an error.
     pub(super) fn run(self, machine: &mut dyn Machine) -> anyhow::Result<Done> {
         let Self { axis, output, .. } = self;
         output.ready()?;
@@ -518,7 +518,7 @@ impl Request {
         words
     }
 
-    /// Commissions the test_axis's axis, with a bar for whoever watches.
+    /// Commissions the axis under test, and shows a progress bar.
     fn run(
         &self,
         test_axis: &mut dyn TestAxis,
@@ -847,7 +847,7 @@ mod tests {
      {
         let folder = tempfile::tempdir().unwrap();
         let mut machine = Spoilt {
-            // Whatever is measured would be an error of its own.
+            // Every measurement would add an error of its own.
             dead: true,
             ..Spoilt::new()
         };
@@ -986,7 +986,8 @@ mod tests {
     }
 
     #[test]
-    fn results_are_written_and_errors_told_though_the_machine_does_not_take_its_settings_back() {
+    fn results_are_written_and_errors_reported_though_the_machine_does_not_take_its_settings_back()
+    {
         for dead in [false, true] {
             let folder = tempfile::tempdir().unwrap();
             let mut machine = Spoilt {
@@ -1036,8 +1037,8 @@ mod tests {
 
         for link in ["x", "x/figures", "settings.toml", "x/experiments"] {
             let link = out.join(link);
-            let aside = folder.path().join("aside");
-            let was_there = std::fs::rename(&link, &aside).is_ok();
+            let moved = folder.path().join("moved");
+            let was_there = std::fs::rename(&link, &moved).is_ok();
             std::fs::create_dir_all(link.parent().unwrap()).unwrap();
             symlink(&elsewhere, &link).unwrap();
             let said = refused();
@@ -1046,7 +1047,7 @@ mod tests {
             assert_eq!(all(), 0, "{}", link.display());
             std::fs::remove_file(&link).unwrap();
             if was_there {
-                std::fs::rename(&aside, &link).unwrap();
+                std::fs::rename(&moved, &link).unwrap();
             }
         }
         // One that is asked for may be a link itself.

@@ -13,8 +13,11 @@ use quadrant_cli::output::Output;
 
 /// Settling time of a saved response, s.
 const SETTLING_S: f64 = 0.7;
+/// Name of the recording of the open-loop test.
 const MOTOR_CONSTANT: &str = "motor-constant-recording.csv";
+/// Name of the recording of the pre-sliding step.
 const PRESLIDING: &str = "virgin-curve-recording.csv";
+/// Name of the table of runs at constant velocity.
 const FRICTION: &str = "friction-map.csv";
 
 /// Name of the `number`th recording of the response, from 1.

@@ -63,7 +63,7 @@ pub(super) enum Command {
         /// The velocity, mm/s, with its sign; 0 brakes.
         velocity_mm_s: f64,
     },
-    /// Tell the speed of the spindle: axes with `feedforward/cancelling` cancel the vibration of the cut by it.
+    /// Set the speed of the spindle: axes with `feedforward/cancelling` cancel the vibration of the cut by it.
     Spindle {
         /// The speed, rpm; 0 if it stands.
         rpm: f64,
@@ -126,7 +126,7 @@ pub(super) enum Command {
     Apply,
     /// Take the last `apply` or `load` of this session back: what acted before acts again.
     Undo,
-    /// Forget what was edited: the draft is what acts again.
+    /// Forget what was edited: the draft equals the settings in force again.
     Revert,
     /// Make the draft the defaults; `apply` lets them act.
     Defaults,
@@ -157,7 +157,7 @@ pub(super) enum Command {
     /// Watch the machine live in the terminal: states, inputs, strip charts of channels, gains that are nudged meanwhile. `?` shows
     /// the keys.
     Watch(WatchOptions),
-    /// Show events as the link tells them: states, faults, motions, settings.
+    /// Show events as the link reports them: states, faults, motions, settings.
     Events {
         /// Duration, s; 0 shows only those that have come already.
         #[arg(default_value_t = 0.0)]
@@ -178,7 +178,7 @@ pub(super) enum Command {
         #[arg(value_parser = input_parser())]
         inputs: Vec<String>,
     },
-    /// Cut the supply of a simulated or emulated machine for a second, whatever it does; what is stored stays.
+    /// Cut the supply of a simulated or emulated machine for a second, in any state; what is stored stays.
     PowerCycle,
     /// Wait: for some seconds of the machine's time, for the axes to rest, or until axes are homed.
     Wait {

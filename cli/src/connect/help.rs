@@ -47,8 +47,9 @@ pub(super) const GROUPS: [(&str, &[&str]); 6] = [
     ),
 ];
 
-/// Characters of a line before what a command does, and those that are left for it.
+/// Characters of a line before what a command does.
 const INDENT: usize = 15;
+/// Characters of a line for what a command does.
 const ROOM: usize = 64;
 
 /// The list for a grammar of lines: each command with the first clause of what it does.

@@ -38,7 +38,7 @@ pub(super) fn data(learning: &Learning) -> Value {
 pub(super) fn adopt(client: &mut Client, axis: Axis) -> anyhow::Result<Answer> {
     let adopted = adopt::adopt(client, axis.into())?;
     let mut lines = vec![format!(
-        "friction of {} is {:.3} times what acts; in the draft now:",
+        "friction of {} is {:.3} times the setting in force; in the draft now:",
         axis.name(),
         adopted.scale
     )];

@@ -137,7 +137,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 /// # Errors
 /// A fault that has ended the motion, or a connection that is broken.
 fn stay(client: &mut Client) -> anyhow::Result<bool> {
-    let mut told = false;
+    let mut reported = false;
     while client.moves() && !client.is_interrupted() {
         // First, for what was acknowledged reaches the control law a little later.
         client.wait(LOOK)?;
@@ -149,9 +149,9 @@ fn stay(client: &mut Client) -> anyhow::Result<bool> {
         if ended || jogs {
             break;
         }
-        if !told {
+        if !reported {
             warn!("the motion is under way, and this ends with it; Ctrl-C stops the axes");
-            told = true;
+            reported = true;
         }
     }
     Ok(!client.is_interrupted())

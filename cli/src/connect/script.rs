@@ -21,7 +21,7 @@ use super::line::{Said, parse};
 use super::session::Session;
 use quadrant_cli::{say, terminal};
 
-/// Time of waiting for input after which the machine is told that its host is there.
+/// Time of waiting for input after which a request reports to the machine that its host is there.
 const ATTENTION: Duration = Duration::from_millis(100);
 
 /// Takes commands until the input ends; says whether all succeeded.
@@ -169,7 +169,7 @@ fn prompt(session: &mut Session) -> anyhow::Result<()> {
         // The first session finds none.
         let _ = editor.load_history(file);
     }
-    let (wanted, wants) = mpsc::channel();
+    let (requests, wants) = mpsc::channel();
     let (lines, read) = mpsc::channel();
     thread::spawn(move || {
         while wants.recv().is_ok() {
@@ -192,7 +192,7 @@ fn prompt(session: &mut Session) -> anyhow::Result<()> {
     );
     let mut interrupts = 0;
     loop {
-        let line = match wanted.send(()) {
+        let line = match requests.send(()) {
             Ok(()) => attended(session, &read, let_time_pass, |client| {
                 client.interrupt().ends()
             }),

@@ -89,7 +89,7 @@ pub(super) fn diff(client: &mut Client, file: Option<&Path>) -> anyhow::Result<A
     let mut lines: Vec<String> = differences.iter().map(difference_line).collect();
     if lines.is_empty() {
         lines.push(match file {
-            Some(file) => format!("what acts is what {} says", file.display()),
+            Some(file) => format!("the settings in force are those of {}", file.display()),
             None => "nothing is edited that does not act".to_owned(),
         });
     }
@@ -167,7 +167,7 @@ pub(super) fn load(session: &mut Session, file: &Path) -> anyhow::Result<Answer>
     Ok(Answer::new(text, data))
 }
 
-/// Says where a file's settings come from: its name, and the last command that had a hand in them.
+/// Says where a file's settings come from: its name, and the last command that changed them.
 fn origin_of(file: &Path, read: &SettingsFile) -> String {
     let name = file.file_name().unwrap_or(file.as_os_str()).display();
     match read.provenance.last() {

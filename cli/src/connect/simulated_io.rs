@@ -66,12 +66,12 @@ pub(super) fn log(session: &mut Session, options: &LogOptions) -> anyhow::Result
     let Some(io) = session.client.simulated_io() else {
         bail!(
             "log: the firmware's log comes through the debug probe, not from {endpoint}: `quadrant connect log --elf FILE`; \
-             `events` shows what the link tells"
+             `events` shows what the link reports"
         );
     };
     let Some(lines) = io.log().context("log")? else {
         bail!(
-            "log: {endpoint} runs without the firmware that logs; `events` shows what the link tells"
+            "log: {endpoint} runs without the firmware that logs; `events` shows what the link reports"
         );
     };
     for line in &lines {

@@ -66,8 +66,9 @@ enum Shape {
     Sampled,
 }
 
-/// Margins when nothing is asked for: the thesis'.
+/// Gain margin by default, dB: the thesis'.
 const GAIN_MARGIN_DB: f64 = 9.9;
+/// Phase margin by default, degrees: the thesis'.
 const PHASE_MARGIN_DEG: f64 = 54.2;
 /// Smallest gain margin of a design to a crossover, unless another is given, dB.
 const LEAST_GAIN_MARGIN_DB: f64 = 6.0;

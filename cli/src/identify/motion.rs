@@ -58,7 +58,7 @@ pub(crate) struct Arguments {
     /// Displacements at which pre-sliding elements may slip, um; at most 8.
     #[arg(long, default_value_t = Numbers(vec![2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 50.0]), value_name = "UM,...")]
     knots_um: Numbers,
-    /// Dead time from voltage to force, s, if it is known, from a frequency response for instance: gentle motions hardly tell it
+    /// Dead time from voltage to force, s, if it is known, from a frequency response for instance: gentle motions hardly distinguish it
     /// from inertia.
     #[arg(long, value_name = "S")]
     dead_time_s: Option<f64>,

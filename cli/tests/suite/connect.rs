@@ -85,7 +85,7 @@ fn the_same_session_is_the_same_to_the_last_byte() {
         (said, std::fs::read(folder.path().join("a.csv")).unwrap())
     });
     assert_eq!(one, other);
-    // What happened before and while it was recorded is told all the same.
+    // What happened before and while it was recorded is reported all the same.
     for event in ["outputs on", "motion begins", "motion ends"] {
         assert!(one.0.contains(event), "{event}: {}", one.0);
     }
@@ -429,7 +429,7 @@ fn inputs_are_pressed_and_the_supply_is_cut() {
     assert_eq!(pressed(2), r#"["x.positive-limit"]"#);
     assert_eq!(pressed(6), "[]");
     assert_eq!(results[5]["result"]["state"], "enabled");
-    // Whatever it did: it has just been switched on.
+    // Its state before does not count: it has just been switched on.
     let after = &results[10]["result"];
     assert_eq!(after["state"], "disabled");
     assert!(after["tick"].as_u64().unwrap() < 1000, "{after}");
@@ -503,12 +503,12 @@ fn inputs_are_seen_and_what_they_prevent() {
     assert!(last.contains("nothing keeps the outputs off"), "{said}");
 }
 
-/// An x axis that was told of 0.7 times its friction, and learns on a sine.
-const TOLD_TOO_LITTLE: &str = "set x/feedforward/gains/gms 0.7\nset x/feedforward/gains/level 0.7\n\
+/// An x axis whose settings have 0.7 times its friction, and learns on a sine.
+const TOO_LITTLE_FRICTION: &str = "set x/feedforward/gains/gms 0.7\nset x/feedforward/gains/level 0.7\n\
      set x/feedforward/gains/viscous 0.7\nset x/feedforward/learning present\napply\n";
 
 #[test]
-fn what_an_axis_has_learnt_is_shown_told_and_kept() {
+fn what_an_axis_has_learnt_is_shown_reported_and_kept() {
     let folder = tempfile::tempdir().unwrap();
     let stage = concat!(
         env!("CARGO_MANIFEST_DIR"),
@@ -518,7 +518,7 @@ fn what_an_axis_has_learnt_is_shown_told_and_kept() {
         folder.path(),
         &["--json"],
         &format!(
-            "load {stage}\n{TOLD_TOO_LITTLE}enable\n\
+            "load {stage}\n{TOO_LITTLE_FRICTION}enable\n\
              circle --radius-mm 5 --feed-mm-min 600 --turns 8\nrun\nwait rest\nstatus\nevents\n\
              adopt x\nadopt x\napply\nstatus\nget x/feedforward/gains/gms\n"
         ),
@@ -537,14 +537,14 @@ fn what_an_axis_has_learnt_is_shown_told_and_kept() {
     assert_eq!(learnt["state"], "at-rest");
     assert!(learnt["error_share"].as_f64().unwrap() < 0.5, "{learnt}");
     assert_eq!(before["learning"][1], Value::Null);
-    let told = of("events")
+    let event = of("events")
         .into_iter()
         .find_map(|line| line["event"].get("FrictionChanged"))
         .unwrap_or_else(|| panic!("{said}"));
-    assert_eq!(told["axis"], "x");
+    assert_eq!(event["axis"], "x");
     assert!(
-        (130..150).contains(&told["percent"].as_u64().unwrap()),
-        "{told}"
+        (130..150).contains(&event["percent"].as_u64().unwrap()),
+        "{event}"
     );
     // Twice is as once.
     let [first, second] = of("adopt")[..] else {

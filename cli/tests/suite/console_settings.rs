@@ -199,7 +199,7 @@ fn what_was_applied_is_undone_step_by_step() {
     assert_eq!(
         read[13]["result"],
         serde_json::json!([]),
-        "the draft is what acts"
+        "the draft equals the settings in force"
     );
     assert_eq!(
         read[14]["result"],
@@ -211,7 +211,7 @@ fn what_was_applied_is_undone_step_by_step() {
 }
 
 #[test]
-fn whatever_follows_an_apply_finds_that_it_acts() {
+fn every_command_after_an_apply_finds_it_in_force() {
     let change = |gain: &str| {
         format!(
             "set x/feedback/pid/kp_v_per_mm {gain}\nset z/feedback/pid/kp_v_per_mm {gain}\napply\n"

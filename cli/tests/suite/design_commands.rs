@@ -58,7 +58,7 @@ fn the_thesis_targets_print_the_thesis_margins() {
 }
 
 #[test]
-fn one_design_builds_on_another_and_the_settings_tell_both() {
+fn one_design_builds_on_another_and_the_settings_name_both() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let bounds = ["--sensitivity-peak", "1.7", "--design-on", "sampled"];

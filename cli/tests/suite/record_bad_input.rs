@@ -382,7 +382,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn whatever_a_cell_holds_nothing_panics_and_only_numbers_pass(
+    fn no_content_of_a_cell_panics_and_only_numbers_pass(
         cell in "\\PC{0,12}",
         row in 0_usize..60,
         column in 0_usize..5,

@@ -17,6 +17,7 @@ use quadrant_sim::record::Recording;
 const ROWS: usize = 10_000_000;
 /// Rows of a stretch that repeats in the file.
 const STRETCH: usize = 1_000_000;
+/// Sampling rate of the file, Hz.
 const RATE_HZ: f64 = 1e4;
 
 /// An axis shaken in open loop.
@@ -108,18 +109,18 @@ fn ten_million_rows_are_identified_in_bounded_time_and_memory() {
 }
 
 #[test]
-fn reading_tells_how_far_it_is() {
+fn reading_reports_its_progress() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("long.csv");
     let recording = shaken().slice(0..200_000);
     write_rows(&path, &recording, recording.len());
-    let mut told: Vec<f64> = Vec::new();
-    let read = Recording::read_csv_with(&path, &mut |share| told.push(share));
+    let mut shares: Vec<f64> = Vec::new();
+    let read = Recording::read_csv_with(&path, &mut |share| shares.push(share));
     let read: Result<Recording, RecordError> = read;
     assert_eq!(read.unwrap().len(), 200_000);
-    assert!(told.len() >= 3 && told.is_sorted(), "{told:?}");
+    assert!(shares.len() >= 3 && shares.is_sorted(), "{shares:?}");
     assert!(
-        told[0] < 0.01 && (0.5..=1.0).contains(&told[told.len() - 1]),
-        "{told:?}"
+        shares[0] < 0.01 && (0.5..=1.0).contains(&shares[shares.len() - 1]),
+        "{shares:?}"
     );
 }

@@ -16,8 +16,9 @@ use rustix::termios::{
     LocalModes, OptionalActions, Termios, Winsize, tcgetattr, tcsetattr, tcsetwinsize,
 };
 
-/// Longest time in which something is said, and in which a whole commissioning ends.
+/// Longest time in which a text appears on the screen.
 const SAID: Duration = Duration::from_secs(20);
+/// Longest time of a whole commissioning.
 const COMMISSIONED: Duration = Duration::from_secs(300);
 
 /// A person at a terminal, with a program in front.

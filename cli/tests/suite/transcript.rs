@@ -11,13 +11,13 @@ const SETTINGS: &str = include_str!("../../../host-sim/data/identified-stage.tom
 const LOG: &str = "> log\n";
 
 /// Transcript of a machine, and the folder with its files.
-struct Told {
+struct Played {
     transcript: String,
     folder: tempfile::TempDir,
 }
 
 /// Plays a script at one of the console's places.
-fn play(place: &[&str], script: &str) -> Told {
+fn play(place: &[&str], script: &str) -> Played {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("stage.toml"), SETTINGS).unwrap();
     let output = command::play(
@@ -28,7 +28,7 @@ fn play(place: &[&str], script: &str) -> Told {
     let transcript = String::from_utf8(output.stdout).unwrap();
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{errors}\n{transcript}");
-    Told { transcript, folder }
+    Played { transcript, folder }
 }
 
 fn golden(name: &str) -> PathBuf {
@@ -47,9 +47,9 @@ fn compare(name: &str, transcript: &str) {
     let expected = fs::read_to_string(&path).unwrap();
     let mut lines = transcript.lines();
     for (number, expected) in (1..).zip(expected.lines()) {
-        let told = lines.next().unwrap_or("(nothing more)");
+        let played_line = lines.next().unwrap_or("(nothing more)");
         assert_eq!(
-            told,
+            played_line,
             expected,
             "{} line {number}; `cargo xtask transcript --overwrite-expected` takes the new one",
             path.display()
@@ -59,8 +59,8 @@ fn compare(name: &str, transcript: &str) {
 }
 
 /// A column of a file that the session has left.
-fn column(told: &Told, file: &str, column: usize) -> Vec<f64> {
-    let text = fs::read_to_string(told.folder.path().join(file)).unwrap();
+fn column(played: &Played, file: &str, column: usize) -> Vec<f64> {
+    let text = fs::read_to_string(played.folder.path().join(file)).unwrap();
     let values = text.lines().skip(1).map(|line| line.split(',').nth(column));
     values
         .map(|value| value.unwrap().parse().unwrap())
@@ -99,11 +99,11 @@ fn larger([one, two]: [f64; 2], [other, another]: [f64; 2]) -> [f64; 2] {
     [one.max(other), two.max(another)]
 }
 
-/// Checks what is true of a story whatever its numbers are.
-fn check(told: &Told) {
-    let lines: Vec<&str> = told.transcript.lines().collect();
+/// Checks what must hold in every run of the script, apart from its numbers.
+fn check(played: &Played) {
+    let lines: Vec<&str> = played.transcript.lines().collect();
     // The change is in what was captured.
-    let change = column(told, "change.csv", 2);
+    let change = column(played, "change.csv", 2);
     let from = number(&lines, "change.csv:", "at tick ");
     let applied = lines.iter().filter(|line| line.contains("settings act"));
     let at = applied
@@ -111,7 +111,7 @@ fn check(told: &Told) {
         .find(|at| (0.0..change.len() as f64).contains(at));
     let at = at.expect("a change within the capture").round() as usize;
     // Bumpless: the change moves the output no further than encoder and motion do in the same jog without one.
-    let before = column(told, "before.csv", 2);
+    let before = column(played, "before.csv", 2);
     let usual = (0..before.len()).filter_map(|tick| steps_at(&before, tick));
     let usual = usual.fold([0.0; 2], larger);
     let moved = (at - 1..=at + 1).filter_map(|tick| steps_at(&change, tick));
@@ -122,15 +122,15 @@ fn check(told: &Told) {
     );
     assert!(usual[1] < 0.02, "{usual:?}: a lost integral term is 0.13 V");
     // The trace of the fault begins with an axis that is driven, and ends with the outputs off.
-    let volts = column(told, "stop.csv", 3);
+    let volts = column(played, "stop.csv", 3);
     assert!(volts[0] != 0.0 && volts.last() == Some(&0.0), "{volts:?}");
 }
 
 #[test]
 fn the_simulated_machine_prints_the_committed_transcript() {
-    let told = play(&["--simulated"], SCRIPT);
-    check(&told);
-    compare("simulated.txt", &told.transcript);
+    let played = play(&["--simulated"], SCRIPT);
+    check(&played);
+    compare("simulated.txt", &played.transcript);
 }
 
 /// The option that names the emulated board.
@@ -148,9 +148,9 @@ fn a_restart_and_a_flash_file_are_the_same_on_the_emulated_board() {
     let folder = tempfile::tempdir().unwrap();
     let [simulated, emulated] = ["--simulated".to_owned(), emulated()].map(|place| {
         let flash = format!("--flash={}", folder.path().join("flash").display());
-        let told = [STORE, ASK].map(|script| play(&[&place, &flash], script).transcript);
+        let played = [STORE, ASK].map(|script| play(&[&place, &flash], script).transcript);
         fs::remove_file(folder.path().join("flash")).unwrap();
-        told
+        played
     });
     assert_eq!(simulated, emulated);
     assert!(
@@ -162,13 +162,13 @@ fn a_restart_and_a_flash_file_are_the_same_on_the_emulated_board() {
 #[test]
 #[ignore = "needs QEMU and the firmware's image: `cargo xtask transcript`"]
 fn the_emulated_board_prints_the_committed_transcript() {
-    let told = play(&[&emulated()], &format!("{SCRIPT}log\n"));
-    check(&told);
-    compare("emulated.txt", &told.transcript);
+    let played = play(&[&emulated()], &format!("{SCRIPT}log\n"));
+    check(&played);
+    compare("emulated.txt", &played.transcript);
 }
 
 #[test]
-fn both_machines_tell_the_same_but_for_their_names_and_the_log() {
+fn both_machines_report_the_same_but_for_their_names_and_the_log() {
     let [simulated, emulated] =
         ["simulated.txt", "emulated.txt"].map(|name| fs::read_to_string(golden(name)).unwrap());
     let (console, log) = emulated.split_once(LOG).unwrap();

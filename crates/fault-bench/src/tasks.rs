@@ -107,7 +107,7 @@ impl Upper {
             counts[0] = x.encoder.read(x.plant.position_mm, x.dead);
         }
         let readings = counts.map(|count| EncoderReading::of(count as u32));
-        self.control.hear(self.intake.frames());
+        self.control.note_requests(self.intake.frames());
         self.outputs = self.control.tick(&mut Inputs {
             readings: readings.into(),
             command: self.commands.pop_front().or(self.inputs.command),

@@ -179,7 +179,7 @@ pub fn refusal_from(station: Station, view: StageView, command: Command) -> Opti
 }
 
 /// Decides if the control law acts on a command now; `None` lets it through. The tick asks, and so do the supervising task
-/// and the server, of a stage that is up to ten ticks old: they tell the person who asked.
+/// and the server, of a stage that is up to ten ticks old: they inform the person who asked.
 pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
     let faulted = matches!(view.safety, SafetyState::Faulted(_));
     let stopping = matches!(view.safety, SafetyState::Stopping(_));

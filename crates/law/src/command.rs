@@ -21,7 +21,7 @@ pub enum Command {
     /// Move an axis at a velocity until another one is asked for; zero ends it. Held to the axis' largest velocity and,
     /// once it is homed, to its travel. Ignored unless enabled, and the axis at rest or jogging.
     Jog(AxisName, Velocity),
-    /// Start the plan's motion of one axis, whatever the others do. Ignored unless enabled and the axis at rest.
+    /// Start the plan's motion of one axis, independent of the others. Ignored unless enabled and the axis at rest.
     StartMove(AxisName),
     /// Start the stream whose first segments the axes have. Ignored unless enabled, all at rest, and the segments there.
     StartStream,

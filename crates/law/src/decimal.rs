@@ -12,12 +12,12 @@ use crate::rounding;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decimal(pub f64);
 
-/// Significant digits: enough to tell a count of 2^32 from the next.
+/// Significant digits: enough to distinguish a count of 2^32 from the next.
 const DIGITS: i32 = 12;
-/// The first digit's place from which on numbers are written with an exponent; with all digits, 10^18 is the unit then.
-const SMALL: i32 = -7;
-/// Numbers from here on are written with an exponent: 1e15.
-const LARGE: i32 = 15;
+/// Place of the first digit up to which numbers have an exponent; with all digits, 10^18 is the unit then.
+const MAX_SMALL_EXPONENT: i32 = -7;
+/// Place of the first digit from which on numbers have an exponent: 1e15.
+const MIN_LARGE_EXPONENT: i32 = 15;
 
 /// 10 to a whole power, by multiplying: exact up to 22.
 #[inline(never)]
@@ -72,7 +72,7 @@ impl fmt::Display for Decimal {
             return f.write_str("inf");
         }
         if let Some(decimals) = f.precision() {
-            let decimals = decimals.min(LARGE as usize);
+            let decimals = decimals.min(MIN_LARGE_EXPONENT as usize);
             let digits = rounding::round(scaled(magnitude, decimals as i32));
             if digits < 1e15 {
                 return write_fixed(f, digits as u64, decimals as u32);
@@ -94,7 +94,7 @@ impl fmt::Display for Decimal {
             digits = rounding::round(scaled(magnitude, DIGITS - 1 - first)) as u64;
         }
         let mut decimals = DIGITS - 1;
-        let exponent = !(SMALL..LARGE).contains(&first);
+        let exponent = !(MAX_SMALL_EXPONENT..MIN_LARGE_EXPONENT).contains(&first);
         if !exponent {
             decimals -= first;
         }

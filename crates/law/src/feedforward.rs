@@ -1,6 +1,6 @@
 //! Feedforward of friction and inertia, from the reference alone.
 //!
-//! Each effect is counted once, whatever is combined:
+//! Each effect is counted once, in every combination:
 //!
 //! | kind         | Coulomb and Stribeck level           | pre-sliding       | viscous |
 //! |--------------|--------------------------------------|-------------------|---------|
@@ -101,7 +101,7 @@ impl FeedforwardKind {
     }
 }
 
-/// Least gain of the pre-sliding model with which it takes over the whole of a voltage.
+/// Least gain of the pre-sliding model with which it adopts the whole of a voltage.
 const LEAST_GAIN: f64 = 0.1;
 
 /// The share of each effect that is fed forward.

@@ -198,7 +198,7 @@ impl<S: Scalar> InjectionState<S> {
         };
     }
 
-    /// Ends it, whatever is left of it; gives what was under way.
+    /// Ends it, and drops the rest of it; returns what was under way.
     pub(crate) fn end(&mut self) -> Option<Injection<S>> {
         let running = core::mem::take(&mut self.running);
         self.next = None;

@@ -82,7 +82,7 @@ impl<S: Scalar> ReferenceGenerator<S> {
     }
 
     /// Delays the start of plans and streams by this many ticks, so that the feedback's reference of every axis starts
-    /// in the same tick, whatever their previews are.
+    /// in the same tick, independent of their previews.
     #[must_use]
     pub fn with_wait(mut self, ticks: u32) -> Self {
         self.wait_ticks = ticks;
@@ -155,14 +155,14 @@ impl<S: Scalar> GeneratorState<S> {
         self.mode
     }
 
-    /// Ends whatever is followed or waits to begin.
+    /// Ends the motion that is followed or waits to begin.
     #[inline(always)]
     pub(crate) fn hold(&mut self) {
         self.mode = MotionMode::Hold;
         self.waiting = 0;
     }
 
-    /// Holds, and forgets what is there of a stream. The memory of a motion is made anew when it starts.
+    /// Holds, and forgets the rest of a stream. The memory of a motion is made again when it starts.
     #[inline(always)]
     pub(crate) fn reset(&mut self) {
         self.hold();
@@ -230,7 +230,7 @@ impl<S: Scalar> ReferenceGenerator<S> {
         state.mode = MotionMode::OpenLoop;
     }
 
-    /// Begins a controlled stop, unless one is under way, and forgets what is there of a stream.
+    /// Begins a controlled stop, unless one is under way, and forgets the rest of a stream.
     pub(crate) fn stop(&self, state: &mut GeneratorState<S>, from: ReferenceState) {
         state.stream.clear();
         if matches!(state.mode, MotionMode::Hold | MotionMode::Stopping) {

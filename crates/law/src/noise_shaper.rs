@@ -57,11 +57,11 @@ impl NoiseShaper {
             Self::FirstOrder => state.last,
             Self::SecondOrder => 2 * state.last - state.before,
         };
-        let wanted = code.0 as i32 + carried;
-        let nearest = (wanted + STEP / 2) >> MISSING_BITS;
+        let requested = code.0 as i32 + carried;
+        let nearest = (requested + STEP / 2) >> MISSING_BITS;
         let word = clamp(nearest, LOWEST, HIGHEST);
         state.before = state.last;
-        state.last = clamp(wanted - word * STEP, -LARGEST_ERROR, LARGEST_ERROR);
+        state.last = clamp(requested - word * STEP, -LARGEST_ERROR, LARGEST_ERROR);
         word as i16
     }
 }

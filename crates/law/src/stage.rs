@@ -157,7 +157,7 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
     }
 
     /// As [`with_fault`](Self::with_fault), for a stage that has not ticked yet. [`FaultCode::SettingsInvalid`] stays until
-    /// [`accept_settings`](Self::accept_settings), whatever other fault is latched first.
+    /// [`accept_settings`](Self::accept_settings), even if another fault is latched first.
     pub fn start_faulted(&mut self, code: FaultCode) {
         self.settings_invalid |= code == FaultCode::SettingsInvalid;
         if matches!(self.safety, SafetyState::Faulted(_)) {
@@ -229,10 +229,10 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
         self.axes[axis].offer_segment(segment);
     }
 
-    /// Takes the speed of the spindle over, for the axes that cancel its vibration.
-    pub fn tell_spindle(&mut self, speed: SpindleSpeed) {
+    /// Sets the speed of the spindle for the axes that cancel its vibration.
+    pub fn set_spindle_speed(&mut self, speed: SpindleSpeed) {
         for axis in &mut *self.axes {
-            axis.tell_spindle(speed);
+            axis.set_spindle_speed(speed);
         }
     }
 
@@ -246,7 +246,7 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
         self.injection.prepare(injection);
     }
 
-    /// True if there is an injection, so that its values are wanted.
+    /// True if there is an injection, so that its values are needed.
     pub fn has_injection(&self) -> bool {
         self.injection.is_prepared()
     }
@@ -601,7 +601,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         if driven && command == Command::ResetFault {
             return;
         }
-        // Whoever has let it through looked at an older state.
+        // The task that let it through saw an older state.
         if admission::refusal(self.view(state), command).is_some() {
             return;
         }

@@ -63,7 +63,7 @@ pub struct Oscillated {
     pub micrometres: u16,
 }
 
-/// Runs at rest with the outputs off after which a motion is told: 0.1 s at 10 kHz.
+/// Runs at rest with the outputs off after which a motion is reported: 0.1 s at 10 kHz.
 const REST_RUNS: u8 = 100;
 
 /// The supervisor's state: the view of its last step.

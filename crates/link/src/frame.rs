@@ -122,7 +122,7 @@ pub struct FrameCounters {
     pub undecodable: u32,
 }
 
-/// Finds the frames in a stream of bytes. Each byte costs the same, whatever it is: COBS and CRC are worked out as
+/// Finds the frames in a stream of bytes. Every byte costs the same: COBS and CRC are worked out as
 /// the bytes come.
 pub struct Receiver {
     body: [u8; BODY_BYTES],

@@ -5,7 +5,7 @@
 //! security policy forbids it to), and is a pure function of its data: no time stamps, no random ids, so that two runs
 //! with the same seed can be compared byte by byte.
 //!
-//! - [`Page::write`] writes the page in the formats wanted: HTML, CSV, JSON, SVG; [`Table::to_text`] serves the terminal.
+//! - [`Page::write`] writes the page in the requested formats: HTML, CSV, JSON, SVG; [`Table::to_text`] serves the terminal.
 //! - [`decimate()`] thins long traces in such a way that spikes, which are what this project is about, survive.
 //! - [`PolarDeviation`] draws a circle test as a ball-bar instrument would (ISO 230-4).
 //!

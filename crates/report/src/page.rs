@@ -100,7 +100,7 @@ impl Block {
         }
     }
 
-    /// Returns the content, whatever its label.
+    /// Returns the content of any label.
     pub(super) fn content(&self) -> Content<'_> {
         match self {
             Self::Table(table) => Content::Table(table),

@@ -1,7 +1,7 @@
 //! Colours of figures, each with its counterpart on a dark page.
 //!
 //! They are those of Okabe and Ito ("Color Universal Design", 2008), which readers with the usual forms of colour blindness
-//! can tell apart; yellow is left out, because thin yellow lines vanish on white paper.
+//! can distinguish; yellow is left out, because thin yellow lines vanish on white paper.
 
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +27,7 @@ pub enum Colour {
 }
 
 impl Colour {
-    /// The order in which [`super::Style::nth`] hands the colours out.
+    /// The order in which [`super::Style::nth`] returns the colours.
     pub(super) const CYCLE: [Self; 6] = [
         Self::Blue,
         Self::Vermillion,

@@ -24,11 +24,15 @@ const STEPS: f64 = 10.0;
 const POINTS: usize = 2_000;
 /// Mean width of a character of the axes' labels, px: images are written without the font that shows them.
 const CHARACTER: f64 = 6.3;
+/// Fonts of the axes' labels.
 const FONT: &str = "system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', Arial, sans-serif";
 /// The library writes a font's em for its size, this much smaller.
 const FONT_SIZE: f64 = 1.24 * STEPS;
+/// Colour of text and axes.
 const INK: RGBColor = RGBColor(0x1b, 0x1b, 0x1b);
+/// Colour of the grid.
 const GRID: RGBColor = RGBColor(0xe6, 0xe6, 0xe3);
+/// Colour of rules.
 const RULE: RGBColor = RGBColor(0xa9, 0xa9, 0xa5);
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 
 use tempfile::Builder;
 
-/// Name of a file that is being written, beside the one that it becomes.
+/// Beginning of the name of a file that is being written, beside the one that it becomes.
 const PREFIX: &str = ".quadrant-";
+/// End of that name.
 const SUFFIX: &str = ".unfinished";
 
 /// Writes a file. If it is a link, the file that it points to; its permissions stay.

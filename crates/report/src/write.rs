@@ -37,7 +37,7 @@ impl Page {
     /// of the files. The same data give the same bytes.
     ///
     /// # Errors
-    /// As [`Self::to_html`], whatever the formats; files that cannot be written.
+    /// As [`Self::to_html`], for all formats; files that cannot be written.
     pub fn write(
         &self,
         folder: &Path,

@@ -72,10 +72,10 @@ pub struct AmplifierSettings {
     pub offset_v: f64,
     /// True if a positive voltage moves the axis to smaller positions.
     pub reversed: bool,
-    /// Output that the motor bears for ever, V; from the output limit on, the load is not watched.
+    /// Output that the motor withstands indefinitely, V; from the output limit on, the load is not watched.
     #[serde(default = "continuous_v")]
     pub continuous_v: f64,
-    /// Time for which the motor bears the output limit, s.
+    /// Time for which the motor withstands the output limit, s.
     #[serde(default = "overload_s")]
     pub overload_s: f64,
 }

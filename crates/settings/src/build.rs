@@ -29,53 +29,62 @@ use quadrant_law::units::{DacCode, Position};
 
 /// Counts that a step of an axis may have however slow: noise of 3 counts RMS makes up to 26 in the difference of two readings.
 const LEAST_STEP_COUNTS: i32 = 32;
-/// Counts that an axis shows for certain: those of one dead line, and noise; and what friction takes up before it yields by
-/// them, over what the settings say, at most.
+/// Counts that an axis shows for certain: those of one dead line, and noise.
 const HELD_COUNTS: f64 = 5.0;
+/// Largest ratio of what friction takes up before it yields by these counts to what the settings say.
 const HELD_ERROR: f64 = 2.0;
-/// Breakaway over that of the settings that need not show as motion in open loop, and below which silence is none.
+/// Largest breakaway over that of the settings that need not show as motion in open loop.
 const FRICTION_ERROR: f64 = 1.5;
+/// Breakaway over that of the settings below which silence of the encoder is no fault.
 const SILENT_FRICTIONS: f64 = 2.0;
-/// What it takes up over breakaway at least, however stiff the settings say it is.
+/// Least share of breakaway that friction takes up, even if the settings call it stiffer.
 const HELD_FRICTIONS: f64 = 0.65;
-/// What friction takes up, over breakaway: of an axis that stands after it slid; that slides; that is turned around, twice 1.4 of
-/// it and some more.
+/// What friction takes up on an axis that stands after it slid, over breakaway.
 const STUCK_FRICTIONS: f64 = 0.75;
+/// The same on an axis that slides.
 const SLIDING_FRICTIONS: f64 = 1.0;
+/// The same on an axis that is turned around: twice 1.4 of breakaway and some more.
 const TURNED_FRICTIONS: f64 = 3.0;
 /// Largest voltage that an axis takes up when it is turned around, over that of the settings.
 const MOST_TURNED: f64 = 1.5;
 /// Voltage with which the law answers a displacement, over its proportional gain: the integral's answer comes to it.
 const ANSWER_ERROR: f64 = 3.0;
-/// Motion that turns an axis around, or shows that it is alive, mm, and in counts at least: noise of some counts stays below.
+/// Least motion that turns an axis around, mm.
 const TURN_MM: f64 = 0.032;
+/// The same in counts: noise of some counts stays below.
 const TURN_COUNTS: f64 = 16.0;
+/// Least motion that shows that an axis is alive, counts.
 const ALIVE_COUNTS: f64 = 64.0;
 /// Distance of the model ahead of an axis that does not follow, mm.
 const AHEAD_MM: f64 = 0.2;
 /// Breakaway of the settings that is a load that there may be, however small the output limit is, at first and later.
 const FIRST_LOAD_FRICTIONS: f64 = 3.0;
-/// Largest load, as a share of the output limit; and before the axis has moved so far after enabling, mm.
+/// Largest load over the output limit.
 const LOAD_SHARE: f64 = 0.3;
+/// The same before the axis has moved by [`PROVING_MM`] after enabling.
 const FIRST_LOAD_SHARE: f64 = 0.1;
+/// Distance after enabling from which on [`LOAD_SHARE`] counts, mm.
 const PROVING_MM: f64 = 1.0;
-/// Distance of the model without motion of the encoder that is a fault, mm, and in counts.
+/// Distance of the model without motion of the encoder that is a fault, mm.
 const MODEL_DISTANCE_MM: f64 = 0.05;
+/// The same in counts.
 const MODEL_COUNTS: f64 = 20.0;
 /// The addition to that distance for the error of the dead time, over gain times largest output times its square: a fifth of the
 /// way that this output brings within it.
 const DELAY_ERROR: f64 = 0.1;
 /// The addition for friction that breaks away or is turned around: the way that its level brings within this time, s.
 const FRICTION_S: f64 = 3.5e-3;
-/// Speed that no load explains, mm/s, and in counts per tick.
+/// Speed that no load explains, mm/s.
 const MODEL_VELOCITY_MM_S: f64 = 80.0;
+/// The same in counts per tick.
 const MODEL_STEP_COUNTS: f64 = 8.0;
 /// Measured speed below which an axis stands, beyond what quantisation adds, mm/s: noise of some counts stays below.
 const STANDSTILL_MM_S: f64 = 5.0;
 /// Ticks that are added to the longest stop, for rounding.
 const STOP_MARGIN_TICKS: u32 = 10;
-/// The budget of the open loop on an axis without a model, V s, beyond a share of the output limit.
+/// Budget of the open loop on an axis without a model, V s.
 const OPEN_BUDGET_V_S: f64 = 8e-3;
+/// Breakaway of such an axis over the output limit: less voltage does not count in this budget.
 const OPEN_SHARE: f64 = 0.02;
 
 impl StageSettings {
@@ -338,7 +347,7 @@ impl AxisSettings {
         }
     }
 
-    /// Cancelling, if it is wanted, and the loop that it is in.
+    /// Cancelling, if the settings have it, and the loop that it is in.
     fn cancelling<'a>(
         &'a self,
         gains: Option<&'a PidGains>,

@@ -15,18 +15,20 @@ use quadrant_law::friction::gms::GmsParameters;
 /// larger.
 const MOST_GAIN: f64 = 0.1;
 
-/// Errors of the plant that the margin is for: mass, and dead time.
+/// Errors of the plant's mass that the margin is for, as factors.
 const MASSES: [f64; 2] = [0.75, 1.33];
+/// Errors of the plant's dead time that the margin is for, as factors.
 const DEAD_TIMES: [f64; 2] = [0.9, 1.1];
 
-/// Amplitudes of a vibration before sliding, mm; the response there counts where it is this share of the one while sliding, and
-/// turns the phase by so much at most.
+/// Amplitudes of a vibration before sliding, mm.
 const AMPLITUDES_MM: [f64; 4] = [2e-3, 5e-3, 10e-3, 20e-3];
+/// Least response before sliding that counts, over the response while sliding.
 const LEAST_SHARE: f64 = 0.3;
+/// Largest lead of the response before sliding that counts, rad.
 const MOST_LEAD: f64 = 45.0 * PI / 180.0;
 
-/// Places at which the virgin curve is integrated.
-const PLACES: u32 = 16;
+/// Number of positions at which the virgin curve is integrated.
+const INTEGRATION_POINTS: u32 = 16;
 
 /// The loop that is cancelled in.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,10 +102,10 @@ impl NominalLoop<'_> {
     fn held(&self, amplitude_mm: f64) -> Complex64 {
         let force = |x| self.friction.virgin_curve_v(x, self.breakaway_v);
         let mut area = 0.0;
-        for place in 0..PLACES {
-            area += force((f64::from(place) + 0.5) / f64::from(PLACES) * amplitude_mm);
+        for place in 0..INTEGRATION_POINTS {
+            area += force((f64::from(place) + 0.5) / f64::from(INTEGRATION_POINTS) * amplitude_mm);
         }
-        let area = area * amplitude_mm / f64::from(PLACES);
+        let area = area * amplitude_mm / f64::from(INTEGRATION_POINTS);
         let level = force(amplitude_mm);
         let lost = 8.0 * area - 4.0 * level * amplitude_mm;
         Complex64::new(

@@ -93,7 +93,7 @@ pub fn reach_mm(motion: &MotionSettings) -> (f64, f64) {
                 None => TAU,
             };
             let (first, last) = (libm::sin(first_rad), libm::sin(first_rad + turned_rad));
-            // The sine's next extreme value, 1 at a quarter of a turn, -1 at three quarters.
+            // The sine's next extreme value, 1 at a quarter of a turn, -1 at 3/4 of it.
             let meets = |extreme_rad: f64| {
                 let turns = libm::ceil((first_rad - extreme_rad) / TAU);
                 extreme_rad + TAU * turns <= first_rad + turned_rad
@@ -170,7 +170,7 @@ impl StageSettings {
     }
 
     /// The move of a homed axis from rest at `from` to `target_mm` at `velocity_mm_s`, within the axis' acceleration and
-    /// jerk. [`PlanSettings::validate`](super::PlanSettings::validate) refuses one that takes too long. Hand it to the axis as its
+    /// jerk. [`PlanSettings::validate`](super::PlanSettings::validate) refuses one that takes too long. Pass it to the axis as its
     /// plan's motion and start it with [`Command::StartMove`](quadrant_law::command::Command::StartMove).
     ///
     /// # Errors

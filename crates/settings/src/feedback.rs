@@ -47,8 +47,9 @@ pub struct FeedbackSettings {
 /// Output of sliding mode before anybody has chosen it, V: several times the friction of the axes this was written for.
 const SWITCHING_V: f64 = 1.0;
 
-/// Widest boundary layer, mm/s, and largest error on a trajectory, mm, that settings may have.
+/// Widest boundary layer of the settings, mm/s.
 const WIDEST_MM_S: f64 = 1e3;
+/// Largest error on a trajectory of the settings, mm.
 const LARGEST_MM: f64 = 30.0;
 
 /// Of the schedule before anybody has chosen it: the integral's share at rest, and the speed from which it is one, mm/s.

@@ -1,4 +1,4 @@
-//! The largest nonlinear gain that the loop bears: the Popov criterion.
+//! The largest nonlinear gain that the loop is stable with: the Popov criterion.
 //!
 //! N-PID puts a gain `k(e)` in front of a linear loop `L`. The loop is absolutely stable for every constant or
 //! error-dependent gain in `[1, k_max]` if, with the lower bound of that sector shifted to zero (`H = L / (1 + L)`,
@@ -11,7 +11,7 @@
 //! Unshifted, the integrator's pole at the origin spoils the test.
 //!
 //! # How it is computed
-//! The left side is linear in q, so its smallest value over w is concave in q: the sign of its slope tells on which
+//! The left side is linear in q, so its smallest value over w is concave in q: the sign of its slope shows on which
 //! side of a q the best one lies, and bisection finds it. w runs over a fixed grid, even on a log scale until the delay
 //! turns the phase faster than the steps resolve, then even on a linear one. Minima between grid points come from
 //! parabolas, the crossings of the real axis, where even a constant gain is limited, from bisection, and everything
@@ -398,7 +398,7 @@ mod tests {
     }
 
     #[test]
-    fn x_axis_bears_a_gain_of_about_three() {
+    fn x_axis_is_stable_up_to_a_gain_of_about_three() {
         let continuous = sector_bound(&X_PLANT, &X_GAINS, 0.0);
         assert!((continuous - 3.127).abs() < 1e-3, "{continuous}");
         let at_10_khz = sector_bound(&X_PLANT, &X_GAINS, 1e-4);
@@ -428,7 +428,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unstable_linear_loop_bears_no_nonlinear_gain() {
+    fn an_unstable_linear_loop_allows_no_nonlinear_gain() {
         assert_eq!(sector_bound(&X_PLANT, &scaled(3.2), 0.0), 1.0);
         assert_eq!(sector_bound(&X_PLANT, &scaled(30.0), 0.0), 1.0);
         let impatient = PidGains {
@@ -460,7 +460,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parameter_outside_its_range_bears_no_nonlinear_gain() {
+    fn a_parameter_outside_its_range_allows_no_nonlinear_gain() {
         for broken in [f64::NAN, f64::INFINITY, -1.0] {
             let plant = PlantModel {
                 damping_per_s: broken,

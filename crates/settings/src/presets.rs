@@ -99,7 +99,7 @@ fn axis(parameters: &Parameters) -> AxisSettings {
             weight,
         })
         .collect();
-    // sigma and B / A: what a run at constant velocity cannot tell apart.
+    // sigma and B / A: a run at constant velocity cannot separate them.
     let viscous_v_s_per_mm = parameters.plant.damping_per_s / parameters.plant.gain_mm_per_v_s2;
     AxisSettings {
         encoder: EncoderSettings {

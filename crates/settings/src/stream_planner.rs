@@ -1,7 +1,7 @@
 //! The slow half of streaming: set points in, checked segments out.
 //!
-//! Every tick of a segment is checked before the segment is handed over, so what the control law gets is within the
-//! axis' limits whatever a host sends.
+//! Every tick of a segment is checked before the control law receives the segment, so what the control law gets is within the
+//! axis' limits for every request of a host.
 
 use core::fmt;
 

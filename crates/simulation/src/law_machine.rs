@@ -117,9 +117,9 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
         self.plan[axis as usize] = motion;
     }
 
-    /// Tells the speed of the spindle.
-    pub fn tell_spindle(&mut self, speed: SpindleSpeed) {
-        self.state.tell_spindle(speed);
+    /// Sets the speed of the spindle.
+    pub fn set_spindle_speed(&mut self, speed: SpindleSpeed) {
+        self.state.set_spindle_speed(speed);
     }
 
     /// Takes other settings between two ticks, as the firmware does: the outputs go over without a jump.
@@ -198,8 +198,9 @@ pub struct Operator {
     script: VecDeque<(u32, Command)>,
 }
 
-/// Tick at which [`Operator::runs_the_plan`] enables, and at which it starts the plan.
+/// Tick at which [`Operator::runs_the_plan`] enables.
 const ENABLE_TICK: u32 = 100;
+/// Tick at which it starts the plan.
 const RUN_TICK: u32 = 200;
 
 impl Operator {

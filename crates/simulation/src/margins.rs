@@ -137,7 +137,7 @@ impl<L: OpenLoop> OpenLoop for Scaled<'_, L> {
 /// A root of a function of the response.
 struct Root {
     omega_rad_s: f64,
-    /// True if the function is below zero before it. As the points on both sides tell: close to the root, rounding decides the sign.
+    /// True if the function is below zero before it. The points on both sides decide: close to the root, rounding decides the sign.
     rises: bool,
 }
 

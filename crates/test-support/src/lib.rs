@@ -114,7 +114,7 @@ pub struct Rig<S: Scalar> {
 }
 
 /// The stage of settings whose plant is only a bound of other settings: the tests put the encoders where no axis could
-/// be, and the plant would tell.
+/// be, and the plant would show it.
 pub fn without_plant<S: Scalar>(settings: &StageSettings) -> Stage<S, 4> {
     settings.validate(4).expect("valid settings");
     let mut settings = settings.clone();
@@ -125,7 +125,7 @@ pub fn without_plant<S: Scalar>(settings: &StageSettings) -> Stage<S, 4> {
 }
 
 impl<S: Scalar> Rig<S> {
-    /// Encoders that the test puts somewhere: nothing holds them against the plant.
+    /// Encoders that the test puts somewhere: nothing compares them with the plant.
     pub fn new(settings: &StageSettings, plan: &PlanSettings) -> Self {
         Self {
             stage: without_plant(settings),
@@ -175,8 +175,8 @@ impl<S: Scalar> Rig<S> {
         }
     }
 
-    /// A stage on a sine of x whose limits bear any error.
-    pub fn that_bears_any_error(mut settings: StageSettings) -> Self {
+    /// A stage on a sine of x whose limits allow any error.
+    pub fn that_allows_any_error(mut settings: StageSettings) -> Self {
         for axis in &mut settings.axes {
             axis.limits.following_error_mm = 20.0;
             axis.limits.following_error_max_mm = 20.0;
@@ -186,7 +186,7 @@ impl<S: Scalar> Rig<S> {
         rig
     }
 
-    /// Shows x counts that grow by `step` a tick, and what is seen of it after each; then what a fault has ended begins anew.
+    /// Shows x counts that grow by `step` a tick, and what is seen of it after each; then what a fault has ended begins again.
     pub fn show_counts<E>(
         &mut self,
         step: i32,

@@ -36,8 +36,9 @@ const RATE_HZ: f64 = 10e3;
 const FIRST_TICKS: usize = 2000;
 /// Repetitions, of which the shortest counts.
 const REPETITIONS: usize = 5;
-/// Amplitudes, mm, and frequencies, Hz, of the axes' sines.
+/// Amplitudes of the axes' sines, mm.
 const AMPLITUDE_MM: [f64; 3] = [4.0, 3.0, 2.0];
+/// Frequencies of the axes' sines, Hz.
 const FREQUENCY_HZ: [f64; 3] = [0.6, 0.7, 0.9];
 
 /// Reference of an axis in a control period.

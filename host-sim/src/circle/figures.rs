@@ -72,7 +72,7 @@ pub(super) fn polar_figures(circles: &[Circle<'_>]) -> Vec<Figure> {
         .collect()
 }
 
-/// The first seed's paths of a circle; the colour tells the configuration, the dash the sense.
+/// The first seed's paths of a circle; the colour shows the configuration, the dash the sense.
 fn traces(circle: &Circle<'_>, index: usize) -> [DeviationTrace; 2] {
     circle.tests[0].turns().map(|(sense, turn)| DeviationTrace {
         name: format!(
@@ -128,7 +128,7 @@ pub(super) fn feed_figures(circles: &[Circle<'_>]) -> Vec<Figure> {
     ]
 }
 
-/// A curve for each configuration and radius; the colour tells the radius, the dash the configuration.
+/// A curve for each configuration and radius; the colour shows the radius, the dash the configuration.
 fn feed_series(circles: &[Circle<'_>], length: fn(&CircleTest) -> f64) -> Vec<Series> {
     let radii = distinct(circles.iter().map(|circle| circle.case.radius_mm));
     let dashes = [Dash::Solid, Dash::Dashed, Dash::Dotted];

@@ -15,7 +15,7 @@ pub const AT_RAD: [f64; 4] = [
 /// A spike is the radial deviation within a window about the reversal that is farthest from the level before it: the mean
 /// deviation over half a window's width before the window. So it is how far the reversal throws the path, and a deviation
 /// that is merely large is none. A path that does not come back within the window (a slow integrator's) counts in full; one
-/// that drifts counts by what it drifts. Half the window is a fiftieth of the turn (7.2 degrees), or 20 ms if that is more (at
+/// that drifts counts by what it drifts. Half the window is 2 % of the turn (7.2 degrees), or 20 ms if that is more (at
 /// high feeds a glitch lasts as long as the control loop takes to answer it), at most 6 hundredths of the turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spikes(pub [f64; 4]);
@@ -81,7 +81,7 @@ mod tests {
     const TURN: usize = 40_000;
 
     #[test]
-    fn spikes_are_told_by_axis_sign_and_sense() {
+    fn spikes_are_distinguished_by_axis_sign_and_sense() {
         let mut deviations = vec![0.003; TURN];
         for (passed, height) in [0.001, -0.002, 0.003, -0.004].into_iter().enumerate() {
             deviations[TURN / 8 + passed * TURN / 4 + 20] += height;
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn a_fast_turn_is_searched_over_the_time_the_loop_needs() {
-        // 6280 samples: a fiftieth of the turn is 12.6 ms, and the spike comes 15 ms late.
+        // 6280 samples: 2 % of the turn is 12.6 ms, and the spike comes 15 ms late.
         let mut deviations = vec![0.0; 6280];
         deviations[6280 / 8 + 150] = 0.002;
         let spikes = Spikes::find(&deviations, Sense::CounterClockwise, 1e4);

@@ -199,7 +199,7 @@ mod tests {
     use super::with_reset;
 
     #[test]
-    fn a_reset_is_told_of_once() {
+    fn a_reset_is_reported_once() {
         assert_eq!(with_reset("find the cause"), "find the cause, then `reset`");
         assert_eq!(with_reset("reset, and enable"), "reset, and enable");
     }

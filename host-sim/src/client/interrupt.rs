@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-/// Requests to stop that a session has not heeded yet; clones are one. A signal's handler makes them, and the [`Client`]
-/// heeds them wherever it waits for the machine: the first stops the axes, a second disables the outputs.
+/// Requests to stop on which a session has not acted yet; clones are one. A signal's handler makes them, and the [`Client`]
+/// acts on them wherever it waits for the machine: the first stops the axes, a second disables the outputs.
 ///
 /// [`Client`]: super::Client
 #[derive(Clone, Debug, Default)]
@@ -12,7 +12,7 @@ pub struct Interrupt(Arc<Requests>);
 
 #[derive(Debug, Default)]
 struct Requests {
-    /// Requests that nobody has heeded yet.
+    /// Requests on which nobody has acted yet.
     waiting: AtomicU32,
     /// Requests since a person gave the last command.
     all: AtomicU32,
@@ -21,7 +21,7 @@ struct Requests {
 }
 
 impl Interrupt {
-    /// Asks to stop; returns the number of requests since the last command, heeded or not, this one included.
+    /// Asks to stop; returns the number of requests since the last command, acted on or not, this one included.
     pub fn request(&self) -> u32 {
         self.0.waiting.fetch_add(1, Ordering::Relaxed);
         self.0.all.fetch_add(1, Ordering::Relaxed) + 1
@@ -43,7 +43,7 @@ impl Interrupt {
         self.0.waiting.swap(0, Ordering::Relaxed)
     }
 
-    /// Counts anew: a person has given another command.
+    /// Counts again from zero: a person has given another command.
     pub(super) fn forget(&self) {
         self.0.all.store(0, Ordering::Relaxed);
     }
@@ -54,7 +54,7 @@ mod tests {
     use super::Interrupt;
 
     #[test]
-    fn a_request_is_the_second_though_the_first_was_heeded() {
+    fn a_request_is_the_second_though_the_first_was_acted_on() {
         let interrupt = Interrupt::default();
         assert_eq!(interrupt.request(), 1);
         assert_eq!(interrupt.take(), 1);

@@ -184,7 +184,7 @@ impl TelemetryRecorder {
         }
     }
 
-    /// Takes the samples that come within `time`; other notices are left for whoever wants them.
+    /// Takes the samples that come within `time`; other notices are left for other readers.
     ///
     /// # Errors
     /// A connection that is broken.
@@ -293,7 +293,7 @@ fn capture(client: &mut Client, request: CaptureRequest) -> Result<CaptureStatus
 /// Reads the capture, waiting until it is frozen for at most `timeout`.
 ///
 /// # Errors
-/// A capture that is not armed, that is not triggered in time, or that is armed anew while it is read.
+/// A capture that is not armed, that is not triggered in time, or that is armed again while it is read.
 pub fn read_capture(
     client: &mut Client,
     timeout: Duration,

@@ -25,16 +25,19 @@ const MOST_NOTICES: usize = 1 << 14;
 /// Longest silence of a host that has started a motion: less than half of the machine's time-out.
 const ALIVE: Duration = Duration::from_millis(200);
 
-/// Longest silence of one that looks at a machine which another program holds, and time for what has come.
+/// Longest silence of a viewer of a machine that another program holds.
 const VIEWING: Duration = Duration::from_secs(1);
+/// Time in which notices that have come are read.
 const TAKING: Duration = Duration::from_millis(1);
 
-/// Time in which the axes come to rest after an interruption, before the outputs are disabled, and time between two looks.
+/// Time in which the axes come to rest after an interruption, before the outputs are disabled.
 const STOPPING: Duration = Duration::from_secs(10);
+/// Time between two looks at them.
 const STOPPING_LOOK: Duration = Duration::from_millis(20);
 
-/// Time for a restart, and pause before the machine is asked again.
+/// Time for a restart.
 const RESTART: Duration = Duration::from_secs(10);
+/// Pause before the machine is asked again.
 const RESTART_PAUSE: Duration = Duration::from_millis(50);
 
 /// Times that a request which may be repeated is made before the machine counts as silent.
@@ -64,7 +67,7 @@ pub struct Client {
     interrupt: Interrupt,
     /// State of the axes since an interruption: nothing starts until [`Client::resume`].
     interrupted: Option<&'static str>,
-    /// The interruption is being heeded.
+    /// The interruption is being acted on.
     stopping: bool,
     /// The last fault that the machine has reported, and how many there were.
     reported: (Option<ReportedFault>, u32),
@@ -96,7 +99,7 @@ impl Client {
             notices: VecDeque::new(),
             dropped_notices: 0,
         };
-        // Ends whatever the other end takes for a frame's beginning.
+        // Ends what the other end takes for a frame's beginning.
         client.send(&[DELIMITER])?;
         client.greet()?;
         if client.transport.is_shared() {
@@ -135,7 +138,7 @@ impl Client {
         self.interrupt.clone()
     }
 
-    /// True if an interruption was heeded since the last [`resume`](Self::resume).
+    /// True if an interruption was acted on since the last [`resume`](Self::resume).
     pub const fn is_interrupted(&self) -> bool {
         self.interrupted.is_some()
     }
@@ -301,13 +304,13 @@ impl Client {
     }
 
     /// Lets the machine know that its host is there, if a motion was started and nothing was asked for a while: it stops what
-    /// its host has started when that falls silent. Asks for everything that others see, if they may look. Whoever lets time
+    /// its host has started when that falls silent. Asks for everything that others see, if they may look. A caller that lets time
     /// pass without [`wait`](Self::wait) calls this a few times a second.
     ///
     /// # Errors
     /// As [`request`](Self::request).
     pub fn keep_alive(&mut self) -> Result<(), ClientError> {
-        self.heed_interrupt()?;
+        self.act_on_interrupt()?;
         let silent = self.now().saturating_sub(self.asked);
         let status = if self.transport.is_shared() {
             let (looked, at) = self.looked;
@@ -342,7 +345,7 @@ impl Client {
 
     /// Stops the axes if somebody asked for it: once, and the outputs go off when it was asked for again before they are at
     /// rest.
-    fn heed_interrupt(&mut self) -> Result<(), ClientError> {
+    fn act_on_interrupt(&mut self) -> Result<(), ClientError> {
         if self.stopping {
             return Ok(());
         }
@@ -550,7 +553,7 @@ impl Client {
         }
     }
 
-    /// Lets the other end hear that this one is there; nobody waits for what it answers to this.
+    /// Reports to the other end that this one is there; nobody waits for what it answers to this.
     fn show_alive(&mut self) -> Result<(), ClientError> {
         self.asked = self.now();
         let request = Request {
@@ -578,7 +581,7 @@ impl Client {
         id: u16,
         due: Duration,
     ) -> Result<Option<Result<Reply, LinkError>>, ClientError> {
-        self.heed_interrupt()?;
+        self.act_on_interrupt()?;
         let mut buffer = [0; FRAME_BYTES];
         let timeout = due.saturating_sub(self.now()).min(ANSWER);
         let count = self

@@ -85,7 +85,7 @@ pub fn references_mm(status: &Status) -> [f64; 3] {
         .map(|axis| axis.position_mm + f64::from(axis.error_mm))
 }
 
-/// Sends set points as fast as the machine has room for them. `progress` is told how many have been sent, and may let other
+/// Sends set points as fast as the machine has room for them. `progress` receives how many have been sent, and may let other
 /// things happen to the client. The motion ends after this, when the last of them is reached. A stream that fails is closed, and
 /// the axes brake: nothing of it waits in the machine.
 ///

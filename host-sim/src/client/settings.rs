@@ -53,7 +53,7 @@ fn request_value(client: &mut Client, request: SettingsRequest) -> Result<LeafVa
 pub struct Difference {
     /// Its path, as it is shown.
     pub path: String,
-    /// The value that acts now; none where what acts lacks the part.
+    /// The value that acts now; none where the settings in force lack the part.
     pub acting: Option<Value>,
     /// The other value: the draft's, or a file's.
     pub other: Option<Value>,
@@ -91,9 +91,9 @@ pub fn against(client: &mut Client, file: &StageSettings) -> Result<Vec<Differen
         let Ok((kind, bytes)) = setting_value::of(file, &path) else {
             continue;
         };
-        let wanted = LeafValue { kind, bytes };
+        let requested = LeafValue { kind, bytes };
         let acting = acting(client, &path)?;
-        let other = decode(&path, &wanted)?;
+        let other = decode(&path, &requested)?;
         if acting.as_ref() != Some(&other) {
             differences.push(Difference {
                 path: short(&path),
@@ -105,7 +105,7 @@ pub fn against(client: &mut Client, file: &StageSettings) -> Result<Vec<Differen
     Ok(differences)
 }
 
-/// The value that acts at a path, if what acts has it.
+/// The value that acts at a path, if the settings in force have it.
 pub(super) fn acting(client: &mut Client, path: &str) -> Result<Option<Value>, ClientError> {
     acting_bytes(client, path)?
         .map(|value| decode(path, &value))
@@ -235,7 +235,7 @@ pub enum ExchangeError {
         /// The first of them.
         path: String,
     },
-    /// The machine refuses the whole, or a leaf; its draft is what acts again.
+    /// The machine refuses the whole, or a leaf; its draft equals the settings in force again.
     #[error("{0}; nothing was changed")]
     Reverted(ClientError),
 }
@@ -259,7 +259,7 @@ pub fn dump(client: &mut Client) -> Result<StageSettings, ClientError> {
     Ok(settings)
 }
 
-/// Reads all settings that act, whatever the draft has.
+/// Reads all settings in force; the draft does not matter.
 ///
 /// # Errors
 /// As [`dump`].
@@ -278,7 +278,7 @@ pub fn in_force(client: &mut Client) -> Result<StageSettings, ClientError> {
     Ok(settings)
 }
 
-/// Reads what acts at paths into settings; a leaf of a part that does not act is left out.
+/// Reads the settings in force at paths; a leaf of a part that does not act is left out.
 fn take_acting(
     client: &mut Client,
     paths: &[String],
@@ -298,7 +298,7 @@ fn take_acting(
     Ok(())
 }
 
-/// Refuses to go on while the draft differs from what acts: what follows would write over it.
+/// Refuses to go on while the draft differs from the settings in force: what follows would write over it.
 ///
 /// # Errors
 /// The settings that are edited, or a connection that is broken.
@@ -369,7 +369,7 @@ fn exchange<T>(
     or_reverted(client, outcome)
 }
 
-/// Makes the draft what acts again where the machine has refused what is in it.
+/// Resets the draft to the settings in force where the machine has refused what is in it.
 fn or_reverted<T>(
     client: &mut Client,
     outcome: Result<T, ExchangeError>,
@@ -391,7 +391,7 @@ fn or_reverted<T>(
 #[derive(Clone, Debug, PartialEq)]
 pub struct Before(Vec<(String, Value)>);
 
-/// Reads what acts wherever the draft differs.
+/// Reads the settings in force wherever the draft differs.
 ///
 /// # Errors
 /// A connection that is broken.
@@ -449,10 +449,10 @@ pub fn take_back(client: &mut Client, before: &Before) -> Result<(usize, Applied
     or_reverted(client, outcome).map(|applied| (before.0.len(), applied))
 }
 
-/// Makes the draft what is wanted; gives the paths that changed, and those that are not in `wanted`.
+/// Makes the draft equal to `requested`; gives the paths that changed, and those that are not in it.
 fn write_draft(
     client: &mut Client,
-    wanted: &StageSettings,
+    requested: &StageSettings,
 ) -> Result<(Vec<String>, Vec<String>), ExchangeError> {
     let mut changed = Vec::new();
     // First the parts that may be left out: they bring leaves, or take them away.
@@ -461,17 +461,17 @@ fn write_draft(
         .partition(|path| is_part(path));
     let parts: Vec<String> = parts;
     for path in &parts {
-        change(client, path, wanted, &mut changed)?;
+        change(client, path, requested, &mut changed)?;
     }
     let paths = list(client, "")?;
     let mut left = Vec::new();
     for path in paths.iter().filter(|path| !is_part(path)) {
-        if !change(client, path, wanted, &mut changed)? {
+        if !change(client, path, requested, &mut changed)? {
             left.push(short(path));
         }
     }
     let mut unknown = None;
-    let _ = wanted.list("", &mut |path| {
+    let _ = requested.list("", &mut |path| {
         if unknown.is_none() && !paths.iter().any(|known| known == path) {
             unknown = Some(short(path));
         }
@@ -482,14 +482,14 @@ fn write_draft(
     }
 }
 
-/// Makes one leaf or part what is wanted; says whether that is known.
+/// Makes one leaf or part equal to `requested`; says whether that is known.
 fn change(
     client: &mut Client,
     path: &str,
-    wanted: &StageSettings,
+    requested: &StageSettings,
     changed: &mut Vec<String>,
 ) -> Result<bool, ClientError> {
-    let Ok((kind, bytes)) = setting_value::of(wanted, path) else {
+    let Ok((kind, bytes)) = setting_value::of(requested, path) else {
         return Ok(false);
     };
     let value = LeafValue { kind, bytes };

@@ -23,8 +23,9 @@ const BUILT: Duration = Duration::from_secs(2);
 /// 500 million. Flash is slower than one a cycle, and filters add to a bound.
 const CHECKED: Duration = Duration::from_secs(10);
 
-/// Time for which, and pause after which, a request is repeated that the machine is too busy for.
+/// Time for which a request is repeated while the machine is busy.
 pub(super) const BUSY: Duration = Duration::from_secs(2);
+/// Pause between two of these requests.
 pub(super) const BUSY_PAUSE: Duration = Duration::from_millis(5);
 
 /// Effect of a request that is made twice.
@@ -34,7 +35,7 @@ pub(super) enum Idempotency {
     Query,
     /// The same as of one: it says what should be, or has a number.
     Idempotent,
-    /// Something else: a second reset would clear another fault unseen, a second arming lose what was captured, and whatever
+    /// Something else: a second reset would clear another fault unseen, a second arming lose what was captured, and a request that
     /// enables the outputs or starts a motion is asked for by a person, each time: somebody at the machine may have switched
     /// off in between.
     NotIdempotent,

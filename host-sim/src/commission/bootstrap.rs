@@ -16,20 +16,21 @@ use crate::design::{Form, Process};
 /// Crossover frequency of the first controller, Hz: a dead time of 5 ms still leaves it a phase margin of 30 deg.
 pub const CROSSOVER_HZ: f64 = 15.0;
 /// Crossover frequency over the frequency from which the derivative acts.
-const LEAD: f64 = 3.0;
+const LEAD_RATIO: f64 = 3.0;
 /// Frequency below which the integral acts, over the crossover frequency.
-const INTEGRAL: f64 = 0.1;
+const INTEGRAL_CORNER_RATIO: f64 = 0.1;
 /// Time constant of the derivative's filter over the inverse crossover frequency in rad/s.
-const FILTER: f64 = 0.03;
+const FILTER_RATIO: f64 = 0.03;
 /// Tracking error allowed while the axis is measured, mm: the first controller is soft.
 const FOLLOWING_ERROR_MM: f64 = 10.0;
 
-/// Crossovers of the first controller over the usual one: less where a structural mode does not bear it.
-pub const BOOTSTRAP_SHARES: [f64; 4] = [1.0, 0.5, 0.25, SOFTEST];
-/// The last of them.
-pub const SOFTEST: f64 = 0.15;
-/// Corner of the low-pass over the crossover where that is below the usual one.
-const LOW_PASS: f64 = 4.0;
+/// Crossovers that the first controller tries, over the usual one: the lower ones leave a structural mode alone.
+pub const BOOTSTRAP_SHARES: [f64; 4] = [1.0, 0.5, 0.25, MIN_BOOTSTRAP_SHARE];
+/// Lowest of these shares.
+pub const MIN_BOOTSTRAP_SHARE: f64 = 0.15;
+/// Corner of the low-pass over the crossover, where that is below the usual one.
+const LOW_PASS_RATIO: f64 = 4.0;
+/// Damping ratio of this low-pass.
 const LOW_PASS_DAMPING: f64 = 0.7;
 
 /// [`bootstrap_settings`] at a share of the usual crossover. Below one, a low-pass is behind the PID, so that the loop's gain is
@@ -43,7 +44,7 @@ pub fn soft_bootstrap_settings(
     let mut settings = bootstrap_at(base, gain_mm_per_v_s2, rate_hz, share * CROSSOVER_HZ);
     settings.feedback.filters = (share < 1.0).then(|| {
         FilterList::from_iter([FilterSettings::low_pass(
-            LOW_PASS * share * CROSSOVER_HZ,
+            LOW_PASS_RATIO * share * CROSSOVER_HZ,
             LOW_PASS_DAMPING,
         )])
     });
@@ -69,13 +70,13 @@ fn bootstrap_at(
     let mut settings = measuring_settings(base);
     let crossover = TAU * crossover_hz;
     // |L| = A Kp sqrt(1 + lead^2) / w^2 = 1 on the double integrator that every axis is above its damping's corner.
-    let kp_v_per_mm = crossover * crossover / (gain_mm_per_v_s2 * LEAD.hypot(1.0));
+    let kp_v_per_mm = crossover * crossover / (gain_mm_per_v_s2 * LEAD_RATIO.hypot(1.0));
     settings.plant = None;
     settings.feedback.pid = PidGains {
         kp_v_per_mm,
-        ki_v_per_mm_s: INTEGRAL * crossover * kp_v_per_mm,
-        kd_v_s_per_mm: LEAD * kp_v_per_mm / crossover,
-        derivative_filter_s: (FILTER / crossover).max(1.0 / rate_hz),
+        ki_v_per_mm_s: INTEGRAL_CORNER_RATIO * crossover * kp_v_per_mm,
+        kd_v_s_per_mm: LEAD_RATIO * kp_v_per_mm / crossover,
+        derivative_filter_s: (FILTER_RATIO / crossover).max(1.0 / rate_hz),
     };
     settings
 }
@@ -133,7 +134,7 @@ const ROUGH_SHARE: f64 = 0.8;
 /// `base` as an axis is measured with it: its PID alone, and room for the error that it makes.
 pub fn measuring_settings(base: &AxisSettings) -> AxisSettings {
     let mut settings = base.clone();
-    // Whoever measures the axis watches it.
+    // The axis is watched while it is measured.
     settings.commissioned = true;
     settings.feedback.law = LawKind::Pid;
     settings.feedforward.kind = FeedforwardKind::None;
@@ -157,7 +158,7 @@ pub fn zero_gain_settings(base: &AxisSettings) -> AxisSettings {
 }
 
 /// `base` with a PID that is quiet enough for the smallest motions: of an axis that is held by friction, the noise of a
-/// fast derivative shakes loose what is to be measured.
+/// fast derivative makes the axis break away, and hides what is to be measured.
 pub fn low_bandwidth_settings(
     base: &AxisSettings,
     plant: &PlantModel,
@@ -178,8 +179,8 @@ pub fn low_bandwidth_settings_on(
         sample_time_s: 1.0 / rate_hz,
         computation_delay_s: 0.0,
     };
-    (0..NARROWINGS)
-        .map(|step| low_bandwidth_settings_by(base, plant, rate_hz, NARROWING.powi(step)))
+    (0..MAX_CROSSOVER_REDUCTIONS)
+        .map(|step| low_bandwidth_settings_by(base, plant, rate_hz, CROSSOVER_REDUCTION.powi(step)))
         .find(|settings| {
             matches!(process, Process::Model(_))
                 || process
@@ -214,16 +215,21 @@ fn low_bandwidth_settings_by(
     settings
 }
 
-/// The low-bandwidth controller: phase that the dead time may turn at its crossover, rad; highest crossover, Hz; crossover over the
-/// frequency from which the derivative acts; integral over proportional gain, 1/s; filter over the inverse crossover.
-/// Factor on that crossover while modes do not bear it, its repetitions, and the bound on `|S|`.
-const NARROWING: f64 = 0.85;
-const NARROWINGS: i32 = 12;
+/// Factor on the crossover of the low-bandwidth controller for each further try, while a mode exceeds the bound on `|S|`.
+const CROSSOVER_REDUCTION: f64 = 0.85;
+/// Largest number of these tries.
+const MAX_CROSSOVER_REDUCTIONS: i32 = 12;
+/// Largest `|S|` of the low-bandwidth controller.
 const QUIET_PEAK: f64 = 1.8;
+/// Phase that the dead time may turn at its crossover, rad.
 const QUIET_PHASE_RAD: f64 = 0.27;
+/// Highest crossover of it, Hz.
 const QUIET_CROSSOVER_HZ: f64 = 60.0;
+/// Crossover over the frequency from which its derivative acts.
 const QUIET_LEAD: f64 = 1.4;
+/// Integral over proportional gain, 1/s.
 const QUIET_INTEGRAL_PER_S: f64 = 5.0;
+/// Time constant of its filter over the inverse crossover in rad/s.
 const QUIET_FILTER: f64 = 0.07;
 
 #[cfg(test)]

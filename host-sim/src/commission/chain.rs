@@ -29,7 +29,7 @@ const STEPS: [(&str, f64); 6] = [
 ];
 
 /// Commissions an axis, unattended. Of `base` encoder, amplifier, limits and derivative filter count, not the gains and the
-/// friction. `progress` is told the step and the share of the whole.
+/// friction. `progress` receives the step and the share of the whole.
 ///
 /// # Errors
 /// The first step that fails, with the reason and a remedy; the axis is left at rest, its outputs off.
@@ -98,7 +98,7 @@ fn guarded(
             report(step, share);
         })?;
         let uneven = map.runs.iter().filter(|run| run.stick_slip).count();
-        let is_even = found.is_ok() && (uneven as f64) < UNEVEN * map.runs.len() as f64;
+        let is_even = found.is_ok() && (uneven as f64) < MAX_UNEVEN_SHARE * map.runs.len() as f64;
         if tried || is_even || !quiet_pid::soften(test_axis, &settings, &mut controller)? {
             break (map, recordings, found?);
         }
@@ -136,7 +136,7 @@ fn guarded(
     let mut softenings = 0;
     let verification = loop {
         match verify(test_axis, &found.settings, &mut |share| report(step, share)) {
-            Err(error) if error.asks_for_softer() && softenings < models::SOFTENINGS => {
+            Err(error) if error.asks_for_softer() && softenings < models::MAX_SOFTENINGS => {
                 softenings += 1;
                 found.soften(&error, rate_hz);
             }
@@ -148,8 +148,8 @@ fn guarded(
     Ok(found)
 }
 
-/// Share of uneven runs from which on it is asked whether the PID shakes the axis: of the simulated stage's axes an eighth are.
-const UNEVEN: f64 = 0.2;
+/// Share of uneven runs from which on the PID is checked for oscillation: of the simulated stage's axes 1/8 are uneven.
+const MAX_UNEVEN_SHARE: f64 = 0.2;
 
 /// Voltages at constant velocities, the recordings of the runs, and the model of them.
 type Friction = (
@@ -158,7 +158,7 @@ type Friction = (
     Result<FrictionFit, CommissionError>,
 );
 
-/// Friction at constant velocities, at faster ones as long as the axis sticks and slips at the slowest, or is shaken loose there; and
+/// Friction at constant velocities, at faster ones as long as the axis sticks and slips at the slowest, or breaks away under vibration; and
 /// its model.
 fn friction(
     test_axis: &mut dyn TestAxis,
@@ -172,9 +172,9 @@ fn friction(
         let (slowest, fastest) = &mut runs.velocities_mm_s;
         match models::even_friction(&map) {
             Err(FrictionFitError::TooFewRuns { .. } | FrictionFitError::Sign { .. })
-                if FASTER * *slowest < *fastest / FASTER =>
+                if SLOWEST_VELOCITY_RAISE * *slowest < *fastest / SLOWEST_VELOCITY_RAISE =>
             {
-                *slowest *= FASTER;
+                *slowest *= SLOWEST_VELOCITY_RAISE;
             }
             _ => {
                 let found = models::friction(&map);
@@ -184,7 +184,7 @@ fn friction(
     }
 }
 
-/// The hysteresis before sliding, and the elements from it. Of an axis that noise or a vibration shakes loose a slow motion meets
+/// The hysteresis before sliding, and the elements from it. On an axis that breaks away under noise or vibration, a slow motion meets
 /// less friction than it will in use: quicker sines are tried until one meets what sliding did, and the one that meets most counts.
 /// The sines run under `quiet`, from the middle of the travel, to which the axis goes under `moving`; from where it stands without.
 fn presliding(
@@ -222,19 +222,19 @@ fn presliding(
     };
     let will_do = |found: &Found| {
         let fits = |gms: &GmsFit| gms.prediction.relative_error < POOR_FIT;
-        met(found) >= MET && found.1.as_ref().is_ok_and(fits)
+        met(found) >= MIN_MET_SHARE && found.1.as_ref().is_ok_and(fits)
     };
     let mut best = measure(test_axis, &sine, progress)?;
     let most_mm = LARGEST_SINE_SHARE * test_axis.info().travel_mm;
-    for _ in 0..REPETITIONS {
+    for _ in 0..MAX_FURTHER_SINES {
         if will_do(&best) {
             break;
         }
         let still_rises = matches!(best.1, Err(VirginCurveError::NoPlateau { .. }));
         if still_rises && sine.amplitude_mm < most_mm {
-            sine.amplitude_mm = (LARGER * sine.amplitude_mm).min(most_mm);
+            sine.amplitude_mm = (FURTHER_AMPLITUDE_RATIO * sine.amplitude_mm).min(most_mm);
         } else {
-            sine.frequency_hz *= QUICKER;
+            sine.frequency_hz *= FURTHER_VELOCITY_RATIO;
         }
         match measure(test_axis, &sine, &mut |_| {}) {
             Ok(found) if met(&found) > met(&best) => best = found,
@@ -247,16 +247,19 @@ fn presliding(
     Ok(best)
 }
 
-/// Share of the least level of sliding that a slow sine meets, or less where the axis is shaken loose; error of the elements'
-/// prediction from which on it counts as such, too; and further sines: their number, each quicker by a factor, or larger by one while
-/// the friction still rises, up to a share of the travel.
-const MET: f64 = 0.8;
+/// Least friction that a slow sine meets over the least level of sliding: with less, the axis breaks away under vibration.
+const MIN_MET_SHARE: f64 = 0.8;
+/// Error of the elements' prediction from which on the fit is poor.
 const POOR_FIT: f64 = 0.2;
-const REPETITIONS: usize = 2;
-const QUICKER: f64 = 4.0;
-const LARGER: f64 = 2.5;
+/// Further sines that are tried.
+const MAX_FURTHER_SINES: usize = 2;
+/// Factor on the velocity of each further sine.
+const FURTHER_VELOCITY_RATIO: f64 = 4.0;
+/// Factor on the amplitude of each further sine, while the friction still rises.
+const FURTHER_AMPLITUDE_RATIO: f64 = 2.5;
+/// Largest amplitude of a further sine over the travel.
 pub(super) const LARGEST_SINE_SHARE: f64 = 0.25;
 /// Share of the travel that the slow sine takes at most at first.
 const SINE_SHARE: f64 = 0.1;
 /// Factor by which the slowest velocity is raised where the axis sticks and slips.
-const FASTER: f64 = 3.0;
+const SLOWEST_VELOCITY_RAISE: f64 = 3.0;

@@ -27,7 +27,7 @@ pub struct CommissionSettings {
 }
 
 impl Default for CommissionSettings {
-    /// The best PID, and three quarters of the Popov bound.
+    /// The best PID, and 75 % of the Popov bound.
     fn default() -> Self {
         Self {
             target: None,
@@ -125,7 +125,7 @@ impl Commissioned {
         let uneven = runs.iter().filter(|run| run.stick_slip).count();
         if 2 * uneven > runs.len() {
             notes.push(format!(
-                "The axis stuck and slipped, or was shaken loose, in {uneven} of {} runs at constant velocity.",
+                "The axis stuck and slipped, or broke away under vibration, in {uneven} of {} runs at constant velocity.",
                 runs.len()
             ));
         }

@@ -26,18 +26,19 @@ pub struct CrossCheck {
 }
 
 /// RMS of the excitation at rest over the friction at breakaway: enough to slide most of the time.
-const EXCITATION: f64 = 2.6;
+const EXCITATION_RATIO: f64 = 2.6;
 /// Lowest frequencies of the excitation, Hz, one after the other until the axis stays within its bounds of way and velocity.
 const LOWEST_HZ: [f64; 3] = [4.0, 10.0, 25.0];
 /// Highest frequency of the excitation, Hz.
 const HIGHEST_HZ: f64 = 400.0;
 /// Period of the excitation, s, and its periods.
 const PERIOD_S: f64 = 0.5;
+/// Periods of the excitation.
 const PERIODS: usize = 12;
 
 impl CrossCheck {
-    /// Excites the axis at rest and moves it to and fro, under the feedback of finished settings; `progress` is told step
-    /// and share.
+    /// Excites the axis at rest and moves it to and fro, under the feedback of finished settings; `progress` receives the step
+    /// and the share.
     ///
     /// # Errors
     /// A run that is stopped, or data that yield no model.
@@ -53,7 +54,7 @@ impl CrossCheck {
             0.5 * (sliding.positive.curve.breakaway_v + sliding.negative.curve.breakaway_v);
         let excitation = |lowest_hz| Excitation {
             waveform: Waveform::Multisine,
-            rms_v: EXCITATION * breakaway_v,
+            rms_v: EXCITATION_RATIO * breakaway_v,
             band_hz: (lowest_hz, HIGHEST_HZ),
             rise_hz: 0.0,
             period_s: PERIOD_S,

@@ -1,7 +1,7 @@
 //! The change of an axis while laws are tried on it, by the error that its PID makes again and again.
 
-/// Change of an error that counts as scatter: two runs in a row differ by as much.
-const SCATTER: f64 = 0.03;
+/// Largest relative change of an error that counts as scatter: two runs in a row differ by as much.
+const MAX_SCATTER: f64 = 0.03;
 
 /// RMS errors of the PID alone on the same sine, in the order of their times.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -35,7 +35,7 @@ impl Drift {
         let errors = self.runs.iter().map(|(_, rms_mm)| *rms_mm);
         let most = errors.clone().fold(f64::NEG_INFINITY, f64::max);
         let least = errors.fold(f64::INFINITY, f64::min);
-        if most <= (1.0 + SCATTER) * least || self.runs.len() < 2 {
+        if most <= (1.0 + MAX_SCATTER) * least || self.runs.len() < 2 {
             return 1.0;
         }
         self.at(to_s) / self.at(from_s)

@@ -3,7 +3,7 @@
 //! Nothing is known of the axis at first, and any loop may turn out unstable. What keeps it from the ends of its travel does
 //! not depend on any model: a motion that does not fit is not begun; the law's own limit of the following error ends
 //! one that strays from its plan, and its limit of the velocity one that is too fast to come to rest within the
-//! travel that is left. Both are set from the travel, for every experiment, and are not those that are handed over.
+//! travel that is left. Both are set from the travel, for every experiment, and are not those of the result.
 
 use quadrant_settings::AxisSettings;
 
@@ -17,11 +17,11 @@ use crate::record::Recording;
 pub(super) const FOLLOWING_SHARE: f64 = 0.17;
 /// Share of the travel in which the axis comes to rest when its outputs go off.
 const COASTING_SHARE: f64 = 0.05;
-/// Shares of the way to the nearer end that tracking error and coasting may take, each.
-const OF_ROOM: f64 = 0.45;
+/// Largest share of the distance to the nearer end for each of tracking error and coasting.
+const MAX_ROOM_SHARE: f64 = 0.45;
 /// Share of the travel that the tracking error may take in any case: an axis at its end must be able to come back.
 const LEAST_SHARE: f64 = 0.02;
-/// Share of the deceleration by friction that is counted on.
+/// Share of the deceleration by friction that the guard relies on.
 const COUNTED_FRICTION: f64 = 0.7;
 /// Lowest limit of the velocity, mm/s.
 const LEAST_LIMIT_MM_S: f64 = 15.0;
@@ -100,7 +100,7 @@ impl<'a> Guard<'a> {
         let Some(slowing) = self.slowing_mm_s2 else {
             return most;
         };
-        let coasting_mm = (COASTING_SHARE * travel_mm).min(OF_ROOM * self.room_mm());
+        let coasting_mm = (COASTING_SHARE * travel_mm).min(MAX_ROOM_SHARE * self.room_mm());
         let stopped_from = (2.0 * slowing * coasting_mm).sqrt();
         let tripped_at = stopped_from / settings.limits.overspeed_ratio;
         tripped_at.max(LEAST_LIMIT_MM_S).min(most)
@@ -116,7 +116,7 @@ impl<'a> Guard<'a> {
         let mut settings = settings.clone();
         let share_mm = FOLLOWING_SHARE * self.axis.info().travel_mm;
         let least_mm = LEAST_SHARE * self.axis.info().travel_mm;
-        let most_mm = share_mm.min((OF_ROOM * self.room_mm()).max(least_mm));
+        let most_mm = share_mm.min((MAX_ROOM_SHARE * self.room_mm()).max(least_mm));
         let limits = &mut settings.limits;
         limits.following_error_mm = limits.following_error_mm.min(most_mm);
         limits.following_error_max_mm = limits.following_error_max_mm.min(most_mm);
@@ -147,7 +147,7 @@ impl<'a> Guard<'a> {
         };
         // Towards the middle is always allowed.
         let travel_mm = self.axis.info().travel_mm;
-        let slack_mm = SLACK * travel_mm;
+        let slack_mm = MAX_START_OFFSET * travel_mm;
         let usable_mm = usable_mm(travel_mm) + slack_mm;
         let (low_mm, high_mm) = (at_mm + span.start, at_mm + span.end);
         let leaves = |end_mm: f64| end_mm.abs() > usable_mm.max(at_mm.abs() + slack_mm);
@@ -189,9 +189,9 @@ impl<'a> Guard<'a> {
 }
 
 /// Time at the end of an experiment that is kept, s.
-const LATEST_S: f64 = 0.5;
-/// Share of the travel by which an experiment may begin beside its place.
-const SLACK: f64 = 0.06;
+const KEPT_S: f64 = 0.5;
+/// Largest distance between the planned and the real start of an experiment, over the travel.
+const MAX_START_OFFSET: f64 = 0.06;
 
 impl TestAxis for Guard<'_> {
     fn info(&self) -> AxisInfo {
@@ -217,7 +217,7 @@ impl TestAxis for Guard<'_> {
         let stopped = self.axis.interrupted().cloned();
         match (&outcome, stopped) {
             (Ok(recording), _) => {
-                let latest = (LATEST_S / recording.sample_time_s) as usize;
+                let latest = (KEPT_S / recording.sample_time_s) as usize;
                 let begin = recording.len().saturating_sub(latest);
                 self.last = recording.slice(begin..recording.len());
                 self.note(experiment, recording, true);
@@ -304,7 +304,7 @@ mod tests {
             let rings = guard.ringing();
             assert!(
                 outcome.is_err(),
-                "{frequency_hz} Hz bears the rigid axis' PID"
+                "{frequency_hz} Hz allows the rigid axis' PID"
             );
             let seen_hz = rings.unwrap().frequency_hz;
             let ratio = seen_hz / frequency_hz;

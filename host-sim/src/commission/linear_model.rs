@@ -32,9 +32,9 @@ pub(super) struct Linear {
 pub(super) const HOME_MM: f64 = 0.0;
 /// Travel either way below which the lag of the first controller counts, and the axis is slow enough to stick and slip under it, mm.
 const SHORT_TRAVEL_MM: f64 = 60.0;
-/// Acceleration per volt over what the levels show, where they are quicker than a mode: to the encoder at the motor it moves
-/// alone, and one on a table hardly follows.
-const MISJUDGED: [f64; 3] = [0.4, 3.0, 9.0];
+/// Factors on the acceleration per volt of the open-loop test that are tried where its levels are quicker than a mode: a motor with the
+/// encoder moves alone, and a table with the encoder hardly follows.
+const GAIN_CORRECTIONS: [f64; 3] = [0.4, 3.0, 9.0];
 
 /// Measures the response and finds the linear model, under controllers for the acceleration per volt that the open-loop test showed, then
 /// for what a gentle one shows, then for others.
@@ -67,12 +67,12 @@ pub(super) fn linear_model(
         Err(error) if error.is_interrupted() => return Err(error),
         Err(error) => error,
     };
-    // Of an axis that rings, the gentle test may tell the mass better, and so make a better first controller.
+    // Of an axis that rings, the gentle test may measure the mass better, and so make a better first controller.
     test_axis.apply(&zero_gain_settings(base))?;
     let gentle = motor_constant::measure_gently(test_axis, steps, &mut |_| {});
     let as_shown = gentle.is_ok().then_some(1.0);
     let motor = gentle.unwrap_or(motor);
-    for misjudged in as_shown.into_iter().chain(MISJUDGED) {
+    for misjudged in as_shown.into_iter().chain(GAIN_CORRECTIONS) {
         match model(test_axis, &motor, misjudged) {
             Ok(found) => return Ok(found),
             Err(error) if error.is_interrupted() => return Err(error),
@@ -90,11 +90,11 @@ fn by_friction(gain_mm_per_v_s2: f64, motor: &MotorConstant) -> f64 {
 
 /// The place to which an axis moves first that stands near an end, mm; none if it stands near enough to the middle.
 pub(super) fn middle_first(info: &AxisInfo) -> Option<f64> {
-    (info.start_mm.abs() > NEAR_MIDDLE * info.travel_mm).then_some(HOME_MM)
+    (info.start_mm.abs() > MIDDLE_SHARE * info.travel_mm).then_some(HOME_MM)
 }
 
-/// Share of the travel within which an axis counts as in the middle.
-const NEAR_MIDDLE: f64 = 0.1;
+/// Distance from the middle, over the travel, within which an axis counts as in the middle.
+const MIDDLE_SHARE: f64 = 0.1;
 
 /// A first controller at a share of the usual crossover, for a gain in mm/(V s^2) that may be wrong: what its voltage cannot do, the axis
 /// cannot, should it run away.
@@ -108,12 +108,12 @@ fn first_controller(
     let settings = soft_bootstrap_settings(base, gain, rate_hz, share);
     let [ahead_v, back_v] = motor.directed_v;
     let excitation_v = FrfSettings::default().excitation.rms_v;
-    let most_v = MOST_OVER_FRICTION * ahead_v.max(back_v).max(excitation_v);
+    let most_v = MAX_FRICTION_RATIO * ahead_v.max(back_v).max(excitation_v);
     with_output_limit(settings, most_v)
 }
 
-/// Voltage of a first controller over friction, or over the excitation where that is more: on random axes those that held took 0.9 to 4.
-const MOST_OVER_FRICTION: f64 = 6.0;
+/// Largest voltage of a first controller over friction, or over the excitation where that is more: on random axes those that held took 0.9 to 4.
+const MAX_FRICTION_RATIO: f64 = 6.0;
 
 /// Moves the axis to the middle of its travel under the first controller, or a softer one where that oscillates. `misjudged`: factor
 /// on the acceleration per volt that the open-loop test showed.
@@ -183,10 +183,10 @@ fn under_first_controllers(
     let (mut share, mut trim, mut trims) = (1.0, 1.0, 0);
     let mut next = next_share(share, &first, seen, is_short);
     let mut trimmed = trimmed(test_axis, &first, seen);
-    for _ in 1..ATTEMPTS {
+    for _ in 1..MAX_CONTROLLERS {
         // The friction that is fed forward is known by its order only: first that, then the controller.
         if let Some(factor) = trimmed
-            && trims < TRIMS
+            && trims < FRICTION_TRIMS
             && feeds_at(share)
         {
             trim *= factor;
@@ -232,14 +232,18 @@ fn trimmed(test_axis: &Guard<'_>, error: &CommissionError, rings: Option<Ringing
         return None;
     }
     if matches!(error, CommissionError::Response(FrfError::Experiment(error)) if error.ran_off()) {
-        return Some(LESS);
+        return Some(FRICTION_REDUCTION);
     }
     if !is_stuck(error) {
         return None;
     }
     let (first, last) = (stopped.reference_mm.first()?, stopped.reference_mm.last()?);
     let behind_mm = (last - stopped.position_mm.last()?) * (last - first).signum();
-    Some(if behind_mm > 0.0 { MORE } else { LESS })
+    Some(if behind_mm > 0.0 {
+        FRICTION_RAISE
+    } else {
+        FRICTION_REDUCTION
+    })
 }
 
 /// Share of the usual crossover that is tried after one that failed; none if there is none left. `is_short`: the travel is below
@@ -257,17 +261,18 @@ fn next_share(
     let held = is_stuck(error) || is_short;
     if rings.is_none() && (share >= 1.0 && held || share > 1.0 && slowed) {
         // The axis is held by more than so soft a controller overcomes.
-        return Some(STIFFER * share).filter(|share| *share <= STIFFEST);
+        return Some(CROSSOVER_RAISE * share).filter(|share| *share <= MAX_CROSSOVER_SHARE);
     }
     // A mode is left alone by a loop that is slow enough.
-    let bears =
-        |share: f64| rings.is_none_or(|seen| share * CROSSOVER_HZ * FAR_BELOW <= seen.frequency_hz);
+    let keeps_away = |share: f64| {
+        rings.is_none_or(|seen| share * CROSSOVER_HZ * MIN_OSCILLATION_RATIO <= seen.frequency_hz)
+    };
     let softer: Vec<f64> = BOOTSTRAP_SHARES
         .into_iter()
         .filter(|next| *next < share.min(1.0))
         .collect();
-    let bearing = softer.iter().copied().find(|next| bears(*next));
-    bearing.or(softer.last().copied())
+    let suitable = softer.iter().copied().find(|next| keeps_away(*next));
+    suitable.or(softer.last().copied())
 }
 
 /// True if the tracking error stopped the axis.
@@ -276,17 +281,20 @@ fn is_stuck(error: &CommissionError) -> bool {
         if error.fault() == Some(FaultCode::FollowingError))
 }
 
-/// First controllers that are tried.
-const ATTEMPTS: usize = 10;
-/// Trims of the friction that is fed forward, for each controller, and their factors.
-const TRIMS: usize = 1;
-const MORE: f64 = 1.2;
-const LESS: f64 = 0.6;
-/// Factor on the crossover of one that does not move the axis, and the largest share of the usual crossover.
-const STIFFER: f64 = 1.7;
-const STIFFEST: f64 = 8.5;
-/// Frequency of an oscillation over the crossover of a loop that bears it.
-const FAR_BELOW: f64 = 6.0;
+/// Largest number of first controllers that are tried.
+const MAX_CONTROLLERS: usize = 10;
+/// Changes of the friction that is fed forward, for each controller.
+const FRICTION_TRIMS: usize = 1;
+/// Factor on that friction where the axis stays behind.
+const FRICTION_RAISE: f64 = 1.2;
+/// Factor on that friction where the axis runs ahead.
+const FRICTION_REDUCTION: f64 = 0.6;
+/// Factor on the crossover of a controller that does not move the axis.
+const CROSSOVER_RAISE: f64 = 1.7;
+/// Largest crossover over the usual one.
+const MAX_CROSSOVER_SHARE: f64 = 8.5;
+/// Least frequency of an oscillation over the crossover of a loop that does not excite it.
+const MIN_OSCILLATION_RATIO: f64 = 6.0;
 
 /// Parameters of the response that suit an axis, without its gain.
 pub(super) fn response_settings(info: &AxisInfo) -> FrfSettings {
@@ -301,7 +309,7 @@ const BIAS_SHARE: f64 = 0.4;
 /// Acceleration per volt on which the usual excitation slides, mm/(V s^2): of the simulated stage's x axis.
 const USUAL_GAIN_MM_PER_V_S2: f64 = 69_390.0;
 /// Times that the excitation is halved before the response is given up.
-const HALVINGS: usize = 6;
+const MAX_HALVINGS: usize = 6;
 
 /// The response of the sliding axis, with less excitation as long as it slows the axis too much, or drives it too far.
 fn sliding_response(
@@ -317,7 +325,7 @@ fn sliding_response(
     let lighter = gain_mm_per_v_s2 / USUAL_GAIN_MM_PER_V_S2;
     settings.excitation.rms_v *= (slower / lighter).min(1.0);
     let start_mm = settings.start_mm(info.travel_mm);
-    for _ in 0..HALVINGS {
+    for _ in 0..MAX_HALVINGS {
         // A pass that was given up ended somewhere on its way.
         approach(test_axis, start_mm).map_err(FrfError::from)?;
         match frf::measure(test_axis, &settings, progress) {

@@ -35,13 +35,14 @@ use crate::record::Recording;
 
 /// Pre-sliding range of a stiff axis, mm: before any is identified.
 const STIFF_RANGE_MM: f64 = 0.001;
-/// Elements that find their own knots.
-const FEW_ELEMENTS: usize = 4;
-/// Share of the largest force at which the pre-sliding range ends, the last knot over that range, and the exponent with which
-/// knots are denser near zero.
-const RISEN: f64 = 0.95;
-const SPREAD: f64 = 1.7;
-const DENSITY: f64 = 1.6;
+/// Number of elements whose knots are fitted.
+const FITTED_KNOTS: usize = 4;
+/// Force at which the pre-sliding range ends, over the largest force.
+const RANGE_FORCE_SHARE: f64 = 0.95;
+/// Last knot over the pre-sliding range.
+const LAST_KNOT_RATIO: f64 = 1.7;
+/// Exponent of the ladder of knots: above 1 they are denser near zero.
+const KNOT_EXPONENT: f64 = 1.6;
 
 /// Measurements of a commissioning.
 #[derive(Clone, Debug)]
@@ -92,7 +93,7 @@ impl Controller {
     }
 
     /// Remarks how often it was softened because of an oscillation while friction held the axis.
-    pub(super) fn tell(&mut self, seen: &Ringing, softenings: i32) {
+    pub(super) fn note_softening(&mut self, seen: &Ringing, softenings: i32) {
         self.remarks.push(format!(
             "While friction held the axis, the PID oscillated at {:.0} Hz ({:.1} um): {}",
             seen.frequency_hz,
@@ -159,13 +160,13 @@ pub(super) fn controller(
         let noise_mm = motor.noise_mm();
         let friction_v = 0.5 * (motor.directed_v[0] + motor.directed_v[1]);
         let mut found = best(filter_s)?;
-        for step in 1..=SLOWER_FILTERS {
+        for step in 1..=MAX_FILTER_STEPS {
             let axis = process(plant, &found.filters);
             let noise_v = noise_voltage_v(&axis, &found.pid, form, noise_mm);
-            if noise_v <= NOISE_SHARE * friction_v {
+            if noise_v <= MAX_NOISE_SHARE * friction_v {
                 break;
             }
-            match best(SLOWER_FILTER.powi(step) * filter_s) {
+            match best(FILTER_RATIO.powi(step) * filter_s) {
                 Ok(quieter) => {
                     found = quieter;
                     found.remarks = vec![format!(
@@ -190,11 +191,12 @@ pub(super) fn controller(
     Ok(alone(design_pid(&process(plant, &[]), &design)?.gains))
 }
 
-/// RMS voltage that the encoder's noise makes in the loop, over friction, from which on the derivative is filtered more; the filters
-/// that are tried, each slower by a factor.
-const NOISE_SHARE: f64 = 0.5;
-const SLOWER_FILTER: f64 = 2.0;
-const SLOWER_FILTERS: i32 = 5;
+/// RMS voltage that the encoder's noise makes in the loop, over friction, from which on the derivative is filtered more.
+const MAX_NOISE_SHARE: f64 = 0.5;
+/// Factor on the filter's time constant for each further try.
+const FILTER_RATIO: f64 = 2.0;
+/// Largest number of these tries.
+const MAX_FILTER_STEPS: i32 = 5;
 
 /// The loop as it runs.
 pub(super) fn sampled(rate_hz: f64) -> Form {
@@ -268,7 +270,7 @@ fn resolved(
     rate_hz: f64,
 ) -> GmsParameters {
     let most_v_per_mm = plant.stiffest_v_per_mm(1.0 / rate_hz);
-    let share = (RESOLVED * most_v_per_mm / gms.stiffness_v_per_mm()).min(1.0);
+    let share = (RESOLUTION_SHARE * most_v_per_mm / gms.stiffness_v_per_mm()).min(1.0);
     for element in &mut gms.elements {
         element.stiffness_v_per_mm =
             (share * element.stiffness_v_per_mm).max(LEAST_STIFFNESS_V_PER_MM);
@@ -277,12 +279,14 @@ fn resolved(
         .map(|model| model.curve.coulomb_v.min(model.curve.breakaway_v))
         .into_iter()
         .fold(f64::INFINITY, f64::min);
-    gms.attraction_v_s = gms.attraction_v_s.min(RESOLVED * lowest_v * rate_hz);
+    gms.attraction_v_s = gms
+        .attraction_v_s
+        .min(RESOLUTION_SHARE * lowest_v * rate_hz);
     gms
 }
 
-/// Share of what is resolved at most that is taken: none of it is lost by rounding.
-const RESOLVED: f64 = 0.999;
+/// Share of the largest value that the law resolves: just below 1, so that rounding loses none of it.
+const RESOLUTION_SHARE: f64 = 0.999;
 
 impl Measurements {
     /// Identifies all models and makes the settings, as a commissioning does that measured this; without a verdict.
@@ -388,17 +392,17 @@ fn feedback(
     }
 }
 
-/// Crossover of a softer PID over that of one which oscillates.
-const SOFTER: f64 = 0.75;
-/// Softer PIDs that are tried where the one that is designed oscillates on the axis, or does not hold it.
-pub(super) const SOFTENINGS: i32 = 6;
+/// Crossover of a softer PID over that of the PID before it.
+const SOFTENING_RATIO: f64 = 0.75;
+/// Largest number of softer PIDs, where the designed one oscillates on the axis, or does not hold it.
+pub(super) const MAX_SOFTENINGS: i32 = 6;
 
 /// A PID of the same shape at a lower crossover.
 fn softer(pid: &PidGains) -> PidGains {
     PidGains {
-        kp_v_per_mm: SOFTER.powi(2) * pid.kp_v_per_mm,
-        ki_v_per_mm_s: SOFTER.powi(3) * pid.ki_v_per_mm_s,
-        kd_v_s_per_mm: SOFTER * pid.kd_v_s_per_mm,
+        kp_v_per_mm: SOFTENING_RATIO.powi(2) * pid.kp_v_per_mm,
+        ki_v_per_mm_s: SOFTENING_RATIO.powi(3) * pid.ki_v_per_mm_s,
+        kd_v_s_per_mm: SOFTENING_RATIO * pid.kd_v_s_per_mm,
         ..*pid
     }
 }
@@ -407,7 +411,7 @@ fn softer(pid: &PidGains) -> PidGains {
 fn softer_remark(softenings: i32) -> String {
     format!(
         "a softer one took its place, with {:.0} % of its crossover and without a nonlinear gain.",
-        100.0 * SOFTER.powi(softenings)
+        100.0 * SOFTENING_RATIO.powi(softenings)
     )
 }
 
@@ -437,17 +441,17 @@ fn identify_elements(
     sliding: &PerDirection<StaticFriction>,
 ) -> Result<GmsFit, VirginCurveError> {
     let identify = |knots| virgin_curve::identify(recording, Some(sliding), &knots);
-    let few = identify(Knots::Automatic(FEW_ELEMENTS))?;
+    let few = identify(Knots::Automatic(FITTED_KNOTS))?;
     let top_v = few.curve.top_v();
     let rising = few
         .curve
         .points
         .iter()
-        .find(|point| point.force_v >= RISEN * top_v);
+        .find(|point| point.force_v >= RANGE_FORCE_SHARE * top_v);
     let range_mm = rising.map_or(0.0, |point| point.displacement_mm);
     let knot = |index: usize| {
         let place = index as f64 / FIRMWARE_ELEMENTS as f64;
-        SPREAD * range_mm * place.powf(DENSITY)
+        LAST_KNOT_RATIO * range_mm * place.powf(KNOT_EXPONENT)
     };
     let many = identify(Knots::At((1..=FIRMWARE_ELEMENTS).map(knot).collect()));
     Ok(match many {

@@ -31,7 +31,7 @@ pub enum OwnStageError {
 }
 
 /// Commissions axes of a stage, in parallel, each as it is switched on: the law knows of it what a data sheet says, and what is measured.
-/// The other axes have the settings that commissioning the built-in stage gave. `progress` is told the share that is done.
+/// The other axes have the settings that commissioning the built-in stage gave. `progress` receives the share that is done.
 ///
 /// # Errors
 /// The first axis whose commissioning ends early.

@@ -239,7 +239,7 @@ fn check_sections(found: &Commissioned, checked: &CrossCheck) -> Vec<Section> {
             heading: "An ordinary motion".to_owned(),
             prose: vec![format!(
                 "Inertia and friction of an ordinary motion, by inverse dynamics, the dead time taken from the linear model: its A is {agreement:.3} \
-                 times that of the frequency response. A motion record cannot tell much of the pre-sliding friction."
+                 times that of the frequency response. A motion record shows little of the pre-sliding friction."
             )],
             blocks: vec![Block::Table(motion_table(&chosen.model, None))],
         });

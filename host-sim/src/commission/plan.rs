@@ -116,7 +116,7 @@ pub fn plan_table(info: &AxisInfo, planned: &[Planned]) -> Table {
         caption: format!(
             "What the {} axis will do: about {:.0} min of axis time, within {:.1} mm either way{beside}. An experiment ends when \
              the axis is {:.1} mm beside its plan, or too fast to stop in time; it is then repeated more gently, which adds to the \
-             time. Positions are known to a count of {} um: errors of two counts are the least that can be told",
+             time. Positions are known to a count of {} um: errors of two counts are the least that the encoder resolves",
             info.name,
             total_s / 60.0,
             info.travel_mm,

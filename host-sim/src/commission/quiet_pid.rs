@@ -1,14 +1,14 @@
 //! The PID alone on a slow sine, where the friction that was measured under it is uneven.
 //!
 //! While friction holds the axis, it is not the one that the PID was designed on: its springs resonate, and the motor does against a
-//! table that stands still. A PID that oscillates there shakes the axis loose, and the friction that is measured or fed forward is not
+//! table that stands still. A PID that oscillates there makes the axis break away, and the friction that is measured or fed forward is not
 //! the one that acts.
 
 use quadrant_settings::AxisSettings;
 
 use super::bootstrap::measuring_settings;
 use super::linear_model::HOME_MM;
-use super::models::{Controller, SOFTENINGS};
+use super::models::{Controller, MAX_SOFTENINGS};
 use super::ringing::{Ringing, lasting};
 use super::verify::{run_sine, sines};
 use crate::experiment::sine_test::SineTest;
@@ -34,11 +34,11 @@ pub(super) fn soften(
     let mut settings = settings.clone();
     let mut softer = controller.clone();
     let mut first = None;
-    for softenings in 0..SOFTENINGS {
+    for softenings in 0..MAX_SOFTENINGS {
         softer.put_into(&mut settings);
         let Some(ringing) = oscillation(test_axis, &settings)? else {
             if let Some(ringing) = first {
-                softer.tell(&ringing, softenings);
+                softer.note_softening(&ringing, softenings);
                 *controller = softer;
             }
             return Ok(first.is_some());

@@ -23,21 +23,23 @@ impl Ringing {
     }
 }
 
-/// The time at the end that is looked at, s: the oscillation grew before.
+/// Windows at the end of a recording that are examined, s: the oscillation grew before.
 const WINDOWS_S: [f64; 4] = [0.02, 0.05, 0.15, 0.4];
 /// Growths that are tried, 1/s.
 const GROWTHS_PER_S: [f64; 4] = [0.0, 15.0, 40.0, 100.0];
-/// Frequencies that are tried, Hz, even on a log scale.
+/// Lowest and highest frequency that is tried, Hz.
 const FREQUENCIES_HZ: (f64, f64) = (5.0, 900.0);
+/// Number of frequencies, even on a log scale.
 const FREQUENCIES: usize = 240;
-/// Least periods in the window, and the least samples in a period.
+/// Least periods in the window.
 const LEAST_PERIODS: f64 = 2.0;
+/// Least samples in a period.
 const LEAST_SAMPLES: f64 = 4.0;
 /// Least share of the motion that is called an oscillation.
 const LEAST_SHARE: f64 = 0.5;
 /// Least amplitude over the largest error: an axis that is stuck trembles, too.
-const LEAST_OF_ERROR: f64 = 0.1;
-/// Most samples that are looked at.
+const MIN_ERROR_SHARE: f64 = 0.1;
+/// Largest number of samples that are examined.
 const MOST_SAMPLES: usize = 1500;
 
 /// The oscillation at the end of a recording, if one sine is most of the motion about a line.
@@ -56,7 +58,7 @@ pub fn ringing(recording: &Recording) -> Option<Ringing> {
         let growths = GROWTHS_PER_S.iter();
         growths
             .filter_map(|&growth_per_s| largest(&errors, growth_per_s, recording.sample_time_s))
-            .filter(|found| found.amplitude_mm > LEAST_OF_ERROR * farthest_mm)
+            .filter(|found| found.amplitude_mm > MIN_ERROR_SHARE * farthest_mm)
             .max_by(|a, b| score(a, window_s).total_cmp(&score(b, window_s)))
             .map(|found| (score(&found, window_s), found))
     });
@@ -67,7 +69,7 @@ pub fn ringing(recording: &Recording) -> Option<Ringing> {
 
 /// True if two oscillations have about the same frequency.
 pub(super) fn alike(a: &Ringing, b: &Ringing) -> bool {
-    (1.0 / SAME..SAME).contains(&(a.frequency_hz / b.frequency_hz))
+    (1.0 / SAME_FREQUENCY_RATIO..SAME_FREQUENCY_RATIO).contains(&(a.frequency_hz / b.frequency_hz))
 }
 
 /// The oscillation that lasts all through a recording, if there is one that is larger than some counts of the encoder.
@@ -86,11 +88,13 @@ pub(super) fn lasting(recording: &Recording, resolution_mm: f64) -> Option<Ringi
     lasts.then_some(first)
 }
 
-/// Parts of a recording in each of which an oscillation is found that lasts; ratio of their frequencies, lowest of them, Hz, and least
-/// amplitude, counts.
+/// Parts of a recording: an oscillation that lasts is found in each of them.
 const PARTS: usize = 4;
-const SAME: f64 = 1.3;
+/// Largest ratio of two frequencies that count as the same.
+const SAME_FREQUENCY_RATIO: f64 = 1.3;
+/// Lowest frequency of an oscillation that lasts, Hz.
 const LEAST_HZ: f64 = 8.0;
+/// Least amplitude of it, counts.
 const LEAST_COUNTS: f64 = 4.0;
 
 /// Worth of a find: few periods can look like much.

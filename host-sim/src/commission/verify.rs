@@ -1,4 +1,4 @@
-//! Trials of the commissioned laws on the axis itself, by its own encoder, and the choice among them: nothing is handed over
+//! Trials of the commissioned laws on the axis itself, by its own encoder, and the choice among them: no law is selected
 //! that is worse than the PID alone on any of the sines, or on those that no law was chosen by.
 
 use std::f64::consts::TAU;
@@ -18,7 +18,7 @@ use crate::machine::{
 use crate::record::Recording;
 
 /// The sines on an axis with room: those by which a law is chosen, the middle velocity of the thesis first, then short, slow and fast;
-/// and from [`CHOOSING`] on, those that are withheld until then.
+/// and from [`CHOICE_SINES`] on, those that are withheld until then.
 const SINES: [SineTest; 7] = [
     SineTest {
         amplitude_mm: 5.0,
@@ -49,14 +49,15 @@ const SINES: [SineTest; 7] = [
         velocity_mm_s: 25.0,
     },
 ];
-/// Sines by which a law is chosen.
-const CHOOSING: usize = 4;
-/// Laws that run on the withheld sines at most, the best first, until one is worse than the PID on none.
-const CANDIDATES: usize = 3;
-/// Sines on which kinds of feedforward are compared; the best then runs on all by which one is chosen.
-const COMPARED: usize = 2;
-/// Share of the travel that a sine's amplitude takes at most, and share of the velocity limit.
+/// Number of sines by which a law is chosen.
+const CHOICE_SINES: usize = 4;
+/// Largest number of laws that run on the withheld sines, the best first, until one is worse than the PID on none.
+const MAX_CANDIDATES: usize = 3;
+/// Number of sines on which kinds of feedforward are compared; the best then runs on all [`CHOICE_SINES`].
+const COMPARISON_SINES: usize = 2;
+/// Largest amplitude of a sine over the travel.
 const MOST_TRAVEL: f64 = 0.4;
+/// Largest velocity of a sine over the velocity limit.
 const MOST_VELOCITY: f64 = 0.5;
 /// Kinds of feedforward that are tried, as far as they were identified.
 const KINDS: [FeedforwardKind; 5] = [
@@ -70,23 +71,24 @@ const KINDS: [FeedforwardKind; 5] = [
 const OTHER_KINDS: usize = 2;
 /// Shares of the identified friction that are tried where the whole of it is worse than the PID anywhere.
 const SHARES: [f64; 3] = [0.75, 0.5, 0.25];
-/// Errors over those of the best kind up to which a kind that stands before it in [`KINDS`] is taken.
-const AS_GOOD: f64 = 1.1;
+/// Largest error over that of the best kind up to which a kind that stands before it in [`KINDS`] is preferred.
+const EQUAL_ERROR_RATIO: f64 = 1.1;
 /// Errors of the static model alone over the PID's from which on its steps make the axis jump.
 const JUMP_RATIO: f64 = 3.0;
 /// Errors over the PID's up to which a law counts as no worse: a repeated run scatters by as much.
-const NO_WORSE: f64 = 1.01;
-/// Mean of the errors over the PID's, and largest error on a withheld sine, from which on a law is not worth its risk on motions that
-/// are not tried.
-const WORTH: f64 = 0.95;
-/// RMS error on a withheld sine over the PID's up to which a largest error that is merely no larger will do: what is left then are
-/// single spikes.
-const CLEAR_RMS: f64 = 0.85;
-/// Counts of the encoder that are the least error that can be told.
-const SEEN_COUNTS: f64 = 2.0;
-/// Counts of the encoder that the largest error, and the RMS error, must exceed the PID's by to be larger.
-const UNSEEN_COUNTS: f64 = 0.25;
-const UNSEEN_RMS_COUNTS: f64 = 0.025;
+const MAX_SCATTER_RATIO: f64 = 1.01;
+/// Largest mean error over the PID's, and largest error on a withheld sine over the PID's, of a law that is selected: with a smaller improvement
+/// it is not worth its risk on motions that are not tried.
+const MAX_ERROR_RATIO: f64 = 0.95;
+/// Largest RMS error on a withheld sine over the PID's of a law whose largest error is no larger than the PID's: what is left then
+/// are single spikes.
+const MAX_RMS_RATIO: f64 = 0.85;
+/// Least error that the encoder resolves, counts.
+const RESOLVED_COUNTS: f64 = 2.0;
+/// Largest excess of a largest error over the PID's that counts as none, counts.
+const NEGLIGIBLE_COUNTS: f64 = 0.25;
+/// The same of an RMS error, counts.
+const NEGLIGIBLE_RMS_COUNTS: f64 = 0.025;
 
 /// The sines that fit an axis.
 pub fn sines(info: &AxisInfo) -> Vec<SineTest> {
@@ -139,7 +141,7 @@ impl LawResult {
     }
 
     /// Factor on the friction that it feeds forward with which it would have left the least error on the first sine, by the errors
-    /// that the same feedback leaves without; 1 where they do not tell.
+    /// that the same feedback leaves without; 1 where they show none.
     fn best_scale(&self, without: &Self, drift: &Drift) -> f64 {
         let (Some(own_s), Some(without_s)) = (self.at_s.first(), without.at_s.first()) else {
             return 1.0;
@@ -174,28 +176,34 @@ impl LawResult {
     /// True if it ran on every sine by which a law is chosen, is better on the mean by enough, and on none that it ran on worse than the PID.
     fn is_better_than(&self, pid: &Self, drift: &Drift) -> bool {
         let (worst, mean) = self.against(pid, drift);
-        let enough = CHOOSING.min(pid.scores.len());
-        self.scores.len() >= enough && worst <= self.most_worse() && mean <= WORTH
+        let enough = CHOICE_SINES.min(pid.scores.len());
+        self.scores.len() >= enough && worst <= self.most_worse() && mean <= MAX_ERROR_RATIO
     }
 
     /// True if on every withheld sine its largest error is below the PID's by enough, or all but what the encoder shows, or no larger
     /// while its RMS error is far below: what is just no worse there may be worse on the next motion.
     fn keeps_clear_of(&self, pid: &Self, drift: &Drift) -> bool {
-        let seen_mm = SEEN_COUNTS * self.settings.encoder.resolution_mm;
+        let seen_mm = RESOLVED_COUNTS * self.settings.encoder.resolution_mm;
         let own = self.scores.iter().zip(&self.at_s);
         let pairs = own.zip(pid.scores.iter().zip(&pid.at_s));
-        pairs.skip(CHOOSING).all(|((own, own_s), (pid, pid_s))| {
-            let changed = drift.between(*pid_s, *own_s);
-            let pid_mm = changed * pid.largest_mm;
-            let mostly_clear = own.rms_mm <= CLEAR_RMS * changed * pid.rms_mm;
-            own.largest_mm <= seen_mm.max(WORTH * pid_mm)
-                || mostly_clear && own.largest_mm <= pid_mm
-        })
+        pairs
+            .skip(CHOICE_SINES)
+            .all(|((own, own_s), (pid, pid_s))| {
+                let changed = drift.between(*pid_s, *own_s);
+                let pid_mm = changed * pid.largest_mm;
+                let mostly_clear = own.rms_mm <= MAX_RMS_RATIO * changed * pid.rms_mm;
+                own.largest_mm <= seen_mm.max(MAX_ERROR_RATIO * pid_mm)
+                    || mostly_clear && own.largest_mm <= pid_mm
+            })
     }
 
     /// Errors over the PID's up to which it counts as no worse: more of the same is known to be, and that is no scatter.
     fn most_worse(&self) -> f64 {
-        if self.is_share { 1.0 } else { NO_WORSE }
+        if self.is_share {
+            1.0
+        } else {
+            MAX_SCATTER_RATIO
+        }
     }
 
     /// Its errors over those that the PID would have made at the same time: the largest of all ratios, and their geometric mean,
@@ -223,8 +231,8 @@ impl LawResult {
             .flat_map(|((own, own_s), (pid, pid_s))| {
                 let changed = drift.between(pid_s, own_s);
                 [
-                    ratio(own.largest_mm, changed * pid.largest_mm, UNSEEN_COUNTS),
-                    ratio(own.rms_mm, changed * pid.rms_mm, UNSEEN_RMS_COUNTS),
+                    ratio(own.largest_mm, changed * pid.largest_mm, NEGLIGIBLE_COUNTS),
+                    ratio(own.rms_mm, changed * pid.rms_mm, NEGLIGIBLE_RMS_COUNTS),
                 ]
             })
             .collect();
@@ -232,13 +240,13 @@ impl LawResult {
     }
 }
 
-/// All trials, and the law that is handed over.
+/// All trials, and the chosen law.
 #[derive(Clone, Debug)]
 pub struct Verification {
     pub sines: Vec<SineTest>,
     /// The PID alone first.
     pub laws: Vec<LawResult>,
-    /// Index of the law that is handed over.
+    /// Index of the chosen law.
     pub chosen: usize,
     /// Change of the axis meanwhile, on the first sine.
     pub drift: Drift,
@@ -260,7 +268,7 @@ impl Verification {
         law.against(&self.laws[0], &self.drift)
     }
 
-    /// Settings of the law that is handed over, with the limits of `base`.
+    /// Settings of the chosen law, with the limits of `base`.
     pub fn settings(&self, base: &AxisSettings) -> AxisSettings {
         AxisSettings {
             limits: base.limits,
@@ -280,7 +288,7 @@ pub enum VerifyError {
     TestAxis(#[from] ExperimentError),
     /// The PID alone oscillates.
     #[error(
-        "The PID oscillates at {:.0} Hz ({:.1} um), whatever the axis does",
+        "The PID oscillates at {:.0} Hz ({:.1} um), in every motion of the axis",
         .0.frequency_hz,
         1e3 * .0.amplitude_mm
     )]
@@ -299,7 +307,7 @@ impl VerifyError {
 }
 
 /// Amplitude over the RMS error from which on an oscillation is most of the error: a reversal is followed by one, too, but it decays.
-const DOMINANT: f64 = 1.0;
+const MIN_DOMINANT_RATIO: f64 = 1.0;
 
 /// Tries laws on the axis: the PID alone, the N-PID alone, the N-PID with every kind of feedforward that was identified, the best of
 /// them over other ranges of pre-sliding displacement, less of it where it is worse than the PID anywhere, and as much of the best as its
@@ -320,7 +328,7 @@ pub fn verify(
         progress,
         done: 0.0,
         used_s: 0.0,
-        listens: true,
+        detects_ringing: true,
         interrupted: None,
     };
     let verdict = choose(&mut bench, settings);
@@ -344,30 +352,30 @@ fn choose(bench: &mut Bench<'_>, settings: &AxisSettings) -> Result<Verification
         full.feedforward.kind = kind;
         full
     };
-    let alone = bench.try_law("PID", &pid, CHOOSING)?;
+    let alone = bench.try_law("PID", &pid, CHOICE_SINES)?;
     if let Some(stopped) = alone.1 {
         return Err(stopped.into());
     }
     if let Some(ringing) = alone.0.rings_alike() {
         return Err(VerifyError::Rings(ringing));
     }
-    bench.listens = false;
+    bench.detects_ringing = false;
     let pid_alone = alone.0.clone();
     let mut drift = Drift::default();
     note(&mut drift, &pid_alone);
     let mut laws = vec![alone.0];
-    let nonlinear = bench.try_law("N-PID", &npid, CHOOSING);
+    let nonlinear = bench.try_law("N-PID", &npid, CHOICE_SINES);
     laws.extend(nonlinear.ok().map(|found| found.0));
 
     let mut kinds: Vec<(FeedforwardKind, LawResult)> = Vec::new();
     for kind in KINDS {
         // A model that was not identified, or that the control rate does not resolve, is refused.
         let law = format!("N-PID + {}", kind.name());
-        if let Ok((found, _)) = bench.try_law(&law, &full(kind), COMPARED) {
+        if let Ok((found, _)) = bench.try_law(&law, &full(kind), COMPARISON_SINES) {
             kinds.push((kind, found));
         }
     }
-    note(&mut drift, &bench.try_law(AGAIN, &pid, 1)?.0);
+    note(&mut drift, &bench.try_law(REPEATED_PID, &pid, 1)?.0);
     // An axis that the sign of the velocity alone makes jump is not to be given it beside a model with memory.
     let jumps = kinds.iter().any(|(kind, law)| {
         *kind == FeedforwardKind::Static && law.against(&pid_alone, &drift).1 > JUMP_RATIO
@@ -382,17 +390,19 @@ fn choose(bench: &mut Bench<'_>, settings: &AxisSettings) -> Result<Verification
         .map(|(_, law)| law.against(&pid_alone, &drift).1);
     let means: Vec<f64> = means.collect();
     let smallest = means.iter().copied().fold(f64::INFINITY, f64::min);
-    let best = means.iter().position(|mean| *mean <= AS_GOOD * smallest);
+    let best = means
+        .iter()
+        .position(|mean| *mean <= EQUAL_ERROR_RATIO * smallest);
     if let Some(index) = best {
         let (kind, compared) = kinds.remove(index);
         let mut whole = bench.stretched(&compared, &pid_alone, &drift);
-        bench.run_on(&mut whole, CHOOSING);
+        bench.run_on(&mut whole, CHOICE_SINES);
         if whole.law != compared.law {
             // One over another range that is stopped on a further sine goes back to the range that was measured.
             if whole.stopped.is_some() {
                 laws.push(whole);
                 whole = compared;
-                bench.run_on(&mut whole, CHOOSING);
+                bench.run_on(&mut whole, CHOICE_SINES);
             } else {
                 kinds.push((kind, compared));
             }
@@ -407,31 +417,32 @@ fn choose(bench: &mut Bench<'_>, settings: &AxisSettings) -> Result<Verification
         });
         for _ in 0..OTHER_KINDS.min(kinds.len()) {
             let (worst_so_far, mean_so_far) = kinds[0].1.against(&pid_alone, &drift);
-            if worst <= NO_WORSE || worst_so_far > NO_WORSE || mean_so_far >= 1.0 {
+            if worst <= MAX_SCATTER_RATIO || worst_so_far > MAX_SCATTER_RATIO || mean_so_far >= 1.0
+            {
                 break;
             }
             let (_, mut other) = kinds.remove(0);
-            bench.run_on(&mut other, CHOOSING);
+            bench.run_on(&mut other, CHOICE_SINES);
             worst = other.against(&pid_alone, &drift).0;
             laws.push(other);
         }
-        let mut is_worse = worst > NO_WORSE;
+        let mut is_worse = worst > MAX_SCATTER_RATIO;
         for share in SHARES {
             if !is_worse {
                 break;
             }
             let law = format!("{law} x {share:.2}");
             if let Ok((mut found, _)) =
-                bench.try_law(&law, &with_friction(&settings, share), CHOOSING)
+                bench.try_law(&law, &with_friction(&settings, share), CHOICE_SINES)
             {
                 found.is_share = true;
                 is_worse = found.against(&pid_alone, &drift).0 > found.most_worse();
                 laws.push(found);
             }
         }
-        note(&mut drift, &bench.try_law(AGAIN, &pid, 1)?.0);
+        note(&mut drift, &bench.try_law(REPEATED_PID, &pid, 1)?.0);
     }
-    // What was measured early or slowly may differ by a scale from what acts on the sines.
+    // What was measured early or slowly may differ by a scale from the friction on the sines.
     let best = &laws[better_than_pid(&laws, &drift).first().copied().unwrap_or(0)];
     let without = laws
         .iter()
@@ -441,12 +452,12 @@ fn choose(bench: &mut Bench<'_>, settings: &AxisSettings) -> Result<Verification
         let base = best;
         let settings = with_friction(&base.settings, scale);
         let law = format!("{} x {scale:.2}", base.law);
-        if let Ok((scaled, _)) = bench.try_law(&law, &settings, CHOOSING) {
+        if let Ok((scaled, _)) = bench.try_law(&law, &settings, CHOICE_SINES) {
             let scaled = LawResult {
                 is_share: base.is_share,
                 ..scaled
             };
-            note(&mut drift, &bench.try_law(AGAIN, &pid, 1)?.0);
+            note(&mut drift, &bench.try_law(REPEATED_PID, &pid, 1)?.0);
             laws.push(scaled);
         }
     }
@@ -502,20 +513,23 @@ fn better_than_pid(laws: &[LawResult], drift: &Drift) -> Vec<usize> {
     better
 }
 
-/// Least relative change of the friction that is fed forward that is worth a further trial, and its largest factor.
+/// Least relative change of the friction that is fed forward that is worth a further trial.
 const LEAST_CORRECTION: f64 = 0.02;
+/// Largest factor on the friction that is fed forward.
 const MOST_SCALE: f64 = 1.5;
 /// Errors of the best kind over the PID's from which on other displacements are tried for its pre-sliding friction: where noise shakes
-/// the axis, a slow sine shows too soft or too stiff a spring. The factor between two of them, how many are tried one way, and the
-/// errors over the last ones' up to which one is better.
-const UNFITTING: f64 = 0.15;
-const STRETCH: f64 = 2.5;
-const STRETCHES: i32 = 4;
-const BETTER: f64 = 0.95;
-/// Errors over the PID's, at worst, up to which a law with the nonlinear gain is tried without.
-const HOPEFUL: f64 = 1.25;
+/// the axis, a slow sine shows too soft or too stiff a spring.
+const MIN_REFIT_RATIO: f64 = 0.15;
+/// Factor from one displacement to the next.
+const STRETCH_RATIO: f64 = 2.5;
+/// Largest number of displacements in each direction.
+const MAX_STRETCHES: i32 = 4;
+/// Largest error over that of the displacement before, up to which the search goes on.
+const MAX_STRETCH_ERROR_RATIO: f64 = 0.95;
+/// Largest error over the PID's up to which a law with the nonlinear gain is tried without that gain.
+const MAX_RETRY_RATIO: f64 = 1.25;
 /// Name of the PID's further runs.
-const AGAIN: &str = "PID, again";
+const REPEATED_PID: &str = "PID, again";
 
 /// Takes a run of the PID on the first sine into account.
 fn note(drift: &mut Drift, pid: &LawResult) {
@@ -527,10 +541,14 @@ fn note(drift: &mut Drift, pid: &LawResult) {
 /// Time that trials take on sines where no share of the friction is to be tried, s.
 pub(super) fn lasts_s(sines: &[SineTest]) -> f64 {
     let runs = |index: usize| {
-        if index >= CHOOSING {
+        if index >= CHOICE_SINES {
             return 2;
         }
-        let compared = if index < COMPARED { KINDS.len() } else { 1 };
+        let compared = if index < COMPARISON_SINES {
+            KINDS.len()
+        } else {
+            1
+        };
         // The PID and the N-PID alone, the best law once more, and the PID again three times.
         3 + compared + 3 * usize::from(index == 0)
     };
@@ -558,7 +576,7 @@ struct Bench<'a> {
     /// Time for which the axis has run on sines, s.
     used_s: f64,
     /// True while oscillations are looked for, which takes longer than anything else here: of the PID alone.
-    listens: bool,
+    detects_ringing: bool,
     /// The interruption by a person, after which nothing more runs.
     interrupted: Option<ExperimentError>,
 }
@@ -569,17 +587,19 @@ impl Bench<'_> {
     fn stretched(&mut self, law: &LawResult, pid: &LawResult, drift: &Drift) -> LawResult {
         let error = |law: &LawResult| law.against(pid, drift).1;
         let mut best = law.clone();
-        for step in [STRETCH, 1.0 / STRETCH] {
+        for step in [STRETCH_RATIO, 1.0 / STRETCH_RATIO] {
             let before = error(&best);
-            for count in 1..=STRETCHES {
-                if error(&best) < UNFITTING {
+            for count in 1..=MAX_STRETCHES {
+                if error(&best) < MIN_REFIT_RATIO {
                     break;
                 }
                 let factor = step.powi(count);
                 let name = format!("{} over {factor:.2} x the range", law.law);
                 let settings = over_range(&law.settings, factor);
-                match self.try_law(&name, &settings, COMPARED) {
-                    Ok((found, _)) if error(&found) < BETTER * error(&best) => best = found,
+                match self.try_law(&name, &settings, COMPARISON_SINES) {
+                    Ok((found, _)) if error(&found) < MAX_STRETCH_ERROR_RATIO * error(&best) => {
+                        best = found
+                    }
                     // A spring that is refused ends it as well.
                     _ => break,
                 }
@@ -617,7 +637,7 @@ impl Bench<'_> {
         Ok((result, stopped))
     }
 
-    /// The law that is handed over where the withheld sines refuse all that were better on the others: another kind, or a share of the
+    /// The law that is chosen where the withheld sines refuse all that were better on the others: another kind, or a share of the
     /// best one's friction. Laws that ran are added.
     fn instead(
         &mut self,
@@ -627,7 +647,7 @@ impl Bench<'_> {
     ) -> Result<usize, VerifyError> {
         let best = laws[1..].iter().rfind(|law| {
             let ran = law.scores.len() + usize::from(law.stopped.is_some());
-            law.feeds_forward() && !law.is_share && ran > CHOOSING
+            law.feeds_forward() && !law.is_share && ran > CHOICE_SINES
         });
         let Some(best) = best else {
             return Ok(0);
@@ -636,11 +656,11 @@ impl Bench<'_> {
         let (others, left): (Vec<_>, Vec<_>) =
             std::mem::take(kinds).into_iter().partition(|(_, law)| {
                 let (worst, mean) = law.against(&laws[0], drift);
-                worst <= NO_WORSE && mean <= WORTH
+                worst <= MAX_SCATTER_RATIO && mean <= MAX_ERROR_RATIO
             });
         *kinds = left;
         for (_, mut other) in others {
-            self.run_on(&mut other, CHOOSING);
+            self.run_on(&mut other, CHOICE_SINES);
             let found = self.add_and_judge(laws, other, drift)?;
             if found != 0 {
                 return Ok(found);
@@ -649,7 +669,7 @@ impl Bench<'_> {
         for share in SHARES {
             let name = format!("{name} x {share:.2}");
             let Ok((mut found, _)) =
-                self.try_law(&name, &with_friction(&settings, share), CHOOSING)
+                self.try_law(&name, &with_friction(&settings, share), CHOICE_SINES)
             else {
                 continue;
             };
@@ -662,7 +682,7 @@ impl Bench<'_> {
         Ok(0)
     }
 
-    /// Adds a law that ran; its index if it is handed over, else the PID's.
+    /// Adds a law that ran; its index if it is chosen, else the PID's.
     fn add_and_judge(
         &mut self,
         laws: &mut Vec<LawResult>,
@@ -674,7 +694,7 @@ impl Bench<'_> {
         self.withheld(laws, from, drift)
     }
 
-    /// The law that is handed over where all with the nonlinear gain were refused: that is an addition, too, and noise or play may make it
+    /// The law that is chosen where all with the nonlinear gain were refused: that is an addition, too, and noise or play may make it
     /// worse than the PID. What was not much worse is tried without it. Laws that ran are added.
     fn without_nonlinear_gain(
         &mut self,
@@ -684,8 +704,8 @@ impl Bench<'_> {
     ) -> Result<usize, VerifyError> {
         let hopeful = laws.iter().filter(|law| {
             let (worst, mean) = law.against(&laws[0], drift);
-            let ran = law.scores.len() >= CHOOSING;
-            law.feeds_forward() && ran && worst <= HOPEFUL && mean <= WORTH
+            let ran = law.scores.len() >= CHOICE_SINES;
+            law.feeds_forward() && ran && worst <= MAX_RETRY_RATIO && mean <= MAX_ERROR_RATIO
         });
         let linear: Vec<_> = hopeful
             .map(|law| {
@@ -698,14 +718,14 @@ impl Bench<'_> {
             .collect();
         let from = laws.len();
         for (name, settings, is_share) in linear {
-            if let Ok((found, _)) = self.try_law(&name, &settings, CHOOSING) {
+            if let Ok((found, _)) = self.try_law(&name, &settings, CHOICE_SINES) {
                 laws.push(LawResult { is_share, ..found });
             }
         }
         self.withheld(laws, from, drift)
     }
 
-    /// The law that is handed over, by its index, of those from one on: the best that is worse than the PID, the first of all, on none of
+    /// The index of the chosen law, of those from one on: the best that is worse than the PID, the first of all, on none of
     /// the sines that were withheld either; the PID if there is none.
     fn withheld(
         &mut self,
@@ -721,7 +741,7 @@ impl Bench<'_> {
         if let Some(stopped) = self.run_on(&mut laws[0], self.sines.len()) {
             return Err(stopped.into());
         }
-        for index in better.into_iter().take(CANDIDATES) {
+        for index in better.into_iter().take(MAX_CANDIDATES) {
             self.run_on(&mut laws[index], self.sines.len());
             let law = &laws[index];
             if law.is_better_than(&laws[0], drift) && law.keeps_clear_of(&laws[0], drift) {
@@ -763,10 +783,12 @@ impl Bench<'_> {
                     self.used_s += one_lasts_s(&self.sines[index]);
                     result.scores.push(score);
                     result.at_s.push(self.used_s);
-                    if self.listens {
+                    if self.detects_ringing {
                         let resolution_mm = result.settings.encoder.resolution_mm;
                         let found = lasting(&recording, resolution_mm);
-                        let is_all = |found: &Ringing| found.amplitude_mm > DOMINANT * score.rms_mm;
+                        let is_all = |found: &Ringing| {
+                            found.amplitude_mm > MIN_DOMINANT_RATIO * score.rms_mm
+                        };
                         result.rings.extend(found.filter(is_all));
                     }
                     if index == 0 {
@@ -896,7 +918,7 @@ mod tests {
     }
 
     #[test]
-    fn a_law_is_handed_over_that_ran_on_every_sine_is_worth_it_and_nowhere_worse() {
+    fn a_law_is_chosen_that_ran_on_every_sine_is_worth_it_and_nowhere_worse() {
         let drift = Drift::default();
         let pid = law(&[(1.0, 0.5), (1.0, 0.5)], &[]);
         let is_better = |scores: &[(f64, f64)], is_share: bool| {
@@ -923,7 +945,7 @@ mod tests {
         );
         // Of another law the PID has run on the withheld sines, too.
         let pid = law(&[(1.0, 0.5); SINES.len()], &[]);
-        let next = law(&[(0.5, 0.3); CHOOSING], &[]);
+        let next = law(&[(0.5, 0.3); CHOICE_SINES], &[]);
         assert!(next.is_better_than(&pid, &drift));
     }
 
@@ -932,7 +954,7 @@ mod tests {
         let drift = Drift::default();
         let count_mm = StageSettings::simulated().axes[0].encoder.resolution_mm;
         let beside = |withheld: [f64; 2], rms_mm: f64| {
-            let chosen_by = [(0.1, 0.05); CHOOSING];
+            let chosen_by = [(0.1, 0.05); CHOICE_SINES];
             let withheld = withheld.map(|largest_mm| (largest_mm, rms_mm));
             law(&[&chosen_by[..], &withheld].concat(), &[])
         };

@@ -97,7 +97,7 @@ impl Request<'_> {
         self.runs().iter().map(Run::expected_s).sum()
     }
 
-    /// Runs everything, in parallel; the same request gives the same entries. `advance` is told the share of the whole
+    /// Runs everything, in parallel; the same request gives the same entries. `advance` receives the share of the whole
     /// that each finished run was.
     ///
     /// # Errors
@@ -257,11 +257,11 @@ mod tests {
             seed: 3,
             seeds: 2,
         };
-        let told = std::sync::Mutex::new(0.0);
+        let shares = std::sync::Mutex::new(0.0);
         let comparison = request
-            .run(&|share| *told.lock().unwrap() += share)
+            .run(&|share| *shares.lock().unwrap() += share)
             .unwrap();
-        assert!((told.into_inner().unwrap() - 1.0_f64).abs() < 1e-9);
+        assert!((shares.into_inner().unwrap() - 1.0_f64).abs() < 1e-9);
         assert_eq!(comparison.entries().len(), 2 * 2 * 2 * 3);
         for entry in comparison.entries() {
             let seeds = match entry.knowledge {

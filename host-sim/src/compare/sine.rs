@@ -17,8 +17,9 @@ use crate::plant::{SimulatedStage, StageParameters};
 pub const AMPLITUDE_MM: f64 = 30.0;
 /// Its largest velocities, mm/s.
 pub const VELOCITIES_MM_S: [f64; 3] = [5.0, 10.0, 15.0];
-/// Cycles at full speed, of which the last whole ones count.
+/// Cycles at full speed.
 pub const CYCLES: f64 = 2.25;
+/// Whole cycles at the end that are scored.
 pub const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;

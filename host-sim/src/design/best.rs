@@ -11,11 +11,12 @@ use super::form::Form;
 use super::loop_shape::OpenLoop;
 use super::pid::{DesignError, PidDesign, PidRequest, Target, design_pid};
 use super::process::Process;
+use super::search::{BOUND_RESERVES, Search};
 pub use super::search::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK};
-use super::search::{Search, TIGHTER};
 
-/// Band over which a disturbance counts, Hz, and the frequencies in it.
+/// Band over which a disturbance counts, Hz.
 const BAND_HZ: (f64, f64) = (0.1, 2000.0);
+/// Number of frequencies in it.
 const FREQUENCIES: usize = 400;
 
 /// The PID with the least error after a step of the load, squared and summed over time, among those whose `|S|` and `|T|`
@@ -28,7 +29,7 @@ pub fn best_pid(process: &Process, form: Form, filter_s: f64) -> Result<PidDesig
         let processes = [(process.clone(), 1.0 - tighter, Vec::new())];
         Search::new(&processes, form, filter_s).kept(process, form)
     };
-    let best = TIGHTER.into_iter().find_map(kept);
+    let best = BOUND_RESERVES.into_iter().find_map(kept);
     // The stiffest loop says what stands in the way.
     best.map_or_else(|| stiffest(process, form, filter_s), Ok)
 }

@@ -43,11 +43,12 @@ pub enum MeasuredError {
     },
 }
 
+/// Fewest lines of a response.
 const LEAST_LINES: usize = 20;
 /// The largest ratio of neighbouring frequencies above the lowest few lines, which lie far apart on a log scale.
 const LARGEST_RATIO: f64 = 1.6;
-/// The gain of the open loop at the band's upper end must be below this: it is taken to fall from there on.
-const FALLEN: f64 = 0.5;
+/// Largest gain of the open loop at the band's upper end: the gain is taken to fall from there on.
+const MAX_END_GAIN: f64 = 0.5;
 
 impl MeasuredResponse {
     /// Keeps the lines with at least a coherence of `least_coherence`, 0 to 1.
@@ -138,7 +139,7 @@ impl<'a> MeasuredLoop<'a> {
     /// True if the loop's gain, times a factor, has fallen at the upper end of the band, so that nothing is to be feared above
     /// it but a resonance that was not measured.
     pub fn has_fallen(&self, factor: f64) -> bool {
-        factor * self.response(self.band_rad_s().1).norm() < FALLEN
+        factor * self.response(self.band_rad_s().1).norm() < MAX_END_GAIN
     }
 }
 

@@ -14,7 +14,7 @@ use super::form::Form;
 use super::margins::Margins;
 use super::pid::{DesignError, PidDesign};
 use super::process::Process;
-use super::search::{Search, TIGHTER};
+use super::search::{BOUND_RESERVES, Search};
 use crate::identify::mode::Mode;
 
 /// A PID, its filters, and what they achieve.
@@ -28,22 +28,24 @@ pub struct ModalDesign {
     pub circle_bound: f64,
 }
 
-/// Factors on the frequency of every mode that the loop must bear.
-const SHIFTS: [f64; 3] = [1.0, 0.95, 1.05];
+/// Factors on the frequency of every mode that the loop must be stable with.
+const MODE_SHIFTS: [f64; 3] = [1.0, 0.95, 1.05];
 /// Bounds of the peaks for shifted modes, over those for the modes as they are.
-const SHIFTED: f64 = 1.25;
+const SHIFTED_PEAK_RATIO: f64 = 1.25;
 /// Largest Ki Kd / Kp^2: with more, friction on the other side of a soft spring makes a limit cycle, which no linear bound shows.
 const MOST_INTEGRAL: f64 = 0.3;
 /// Frequencies about each mode, in its widths.
-const ABOUT_A_MODE: [f64; 11] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0, 13.0, 20.0];
-/// Share by which a filter must lower the error.
-const WORTH: f64 = 0.04;
-/// Widths and depths of notches that are tried; corners of low-passes over the frequency of the lowest mode.
+const MODE_WIDTHS: [f64; 11] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0, 13.0, 20.0];
+/// Least relative reduction of the error for which a filter is added.
+const MIN_FILTER_BENEFIT: f64 = 0.04;
+/// Widths and depths of the notches that are tried.
 const NOTCHES: [(f64, f64); 4] = [(0.25, 0.1), (0.5, 0.1), (0.8, 0.05), (1.2, 0.2)];
+/// Corners of the low-passes that are tried, over the frequency of the lowest mode.
 const LOW_PASSES: [f64; 4] = [0.35, 0.6, 1.0, 2.0];
+/// Damping ratio of these low-passes.
 const LOW_PASS_DAMPING: f64 = 0.7;
 /// Highest frequency of a filter over the control rate.
-const HIGHEST_FILTER: f64 = 0.4;
+const MAX_FILTER_RATIO: f64 = 0.4;
 
 /// Designs PID and filters for an axis with modes.
 ///
@@ -57,11 +59,11 @@ pub fn modal_pid(
 ) -> Result<ModalDesign, DesignError> {
     let mut best: Option<(f64, Vec<FilterSettings>)> = None;
     for filters in candidates(modes, form) {
-        let search = search(plant, modes, &filters, form, filter_s, TIGHTER[0]);
+        let search = search(plant, modes, &filters, form, filter_s, BOUND_RESERVES[0]);
         if let Some(found) = search.best()
             && form.is_accepted(plant, &found.gains, &filters)
         {
-            let counted = found.cost + WORTH * filters.len() as f64;
+            let counted = found.cost + MIN_FILTER_BENEFIT * filters.len() as f64;
             if best.as_ref().is_none_or(|(least, ..)| counted < *least) {
                 best = Some((counted, filters));
             }
@@ -90,7 +92,10 @@ pub fn modal_pid(
             margins,
         })
     };
-    TIGHTER.into_iter().find_map(kept).ok_or_else(refused)
+    BOUND_RESERVES
+        .into_iter()
+        .find_map(kept)
+        .ok_or_else(refused)
 }
 
 impl Form {
@@ -108,7 +113,7 @@ impl Form {
 fn candidates(modes: &[Mode], form: Form) -> Vec<Vec<FilterSettings>> {
     let highest_hz = match form {
         Form::Continuous => f64::INFINITY,
-        Form::Sampled { sample_time_s, .. } => HIGHEST_FILTER / sample_time_s,
+        Form::Sampled { sample_time_s, .. } => MAX_FILTER_RATIO / sample_time_s,
     };
     let mut sets = vec![Vec::new()];
     let Some(lowest) = modes
@@ -146,7 +151,7 @@ fn search(
     filter_s: f64,
     tighter: f64,
 ) -> Search {
-    let processes = SHIFTS.map(|shift| {
+    let processes = MODE_SHIFTS.map(|shift| {
         let modes: Vec<Mode> = modes.iter().map(|mode| mode.shifted(shift)).collect();
         let about = modes.iter().flat_map(frequencies_about).collect();
         let process = Process::Modelled {
@@ -154,7 +159,11 @@ fn search(
             modes,
             filters: filters.to_vec(),
         };
-        let wider = if shift == 1.0 { 1.0 } else { SHIFTED };
+        let wider = if shift == 1.0 {
+            1.0
+        } else {
+            SHIFTED_PEAK_RATIO
+        };
         (process, wider * (1.0 - tighter), about)
     });
     Search::new(&processes, form, filter_s).with_integral_within(MOST_INTEGRAL)
@@ -165,7 +174,7 @@ fn frequencies_about(mode: &Mode) -> Vec<f64> {
     let anti = mode.anti.into_iter();
     anti.chain([(mode.frequency_hz, mode.damping)])
         .flat_map(|(hz, damping)| {
-            ABOUT_A_MODE.into_iter().flat_map(move |widths| {
+            MODE_WIDTHS.into_iter().flat_map(move |widths| {
                 let away = widths * damping;
                 [hz / (1.0 + away), hz * (1.0 + away)]
             })
@@ -220,7 +229,7 @@ mod tests {
                 "{found:?}"
             );
             assert!(found.circle_bound > 1.0);
-            for shift in SHIFTS {
+            for shift in MODE_SHIFTS {
                 let shifted = on(&[mode.shifted(shift)], &found.filters);
                 let margins = shifted.margins(&found.gains, SAMPLED).unwrap();
                 assert!(margins.sensitivity_peak < 2.3, "{shift}: {margins:?}");

@@ -32,7 +32,7 @@ pub enum Range {
 }
 
 impl Default for NonlinearRule {
-    /// Three quarters of the bound over 0.1 mm.
+    /// 75 % of the bound over 0.1 mm.
     fn default() -> Self {
         Self {
             sector_share: 0.75,
@@ -72,12 +72,15 @@ pub fn filtered_proof(
     }
 }
 
-/// Frequencies of the plot, and the decades from [`LOWEST_HZ`] that they cover.
+/// Number of frequencies of the plot.
 const FREQUENCIES: u32 = 5000;
+/// Decades that they cover.
 const DECADES: f64 = 5.0;
+/// Lowest of them, Hz.
 const LOWEST_HZ: f64 = 0.1;
-/// Largest q that is tried, s, and the thirds by which its interval shrinks.
+/// Largest q that is tried, s.
 const SLOWEST_S: f64 = 1.0;
+/// Steps of the search of q; each takes 1/3 of the interval away.
 const THIRDS: usize = 100;
 
 /// The q of the line that leaves the Popov plot furthest to its right, s, and the circle bound.

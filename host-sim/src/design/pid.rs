@@ -96,7 +96,7 @@ pub enum DesignError {
         /// Margin asked for, dB.
         least_db: f64,
     },
-    /// No loop bears a structural mode.
+    /// No loop is stable with a structural mode.
     #[error(
         "no PID, with or without notch and low-pass, keeps |S| and |T| within their bounds with the mode at {frequency_hz:.0} Hz: a stiffer \
          coupling or guide, more damping, or the encoder on the motor would help; by hand, settings with less bandwidth"

@@ -18,29 +18,37 @@ use super::loop_shape::OpenLoop;
 use super::pid::PidDesign;
 use super::process::Process;
 
-/// Bounds on the peaks of `|S|` and `|T|`: usual ones (Åström and Hägglund, *Advanced PID Control*, 2006, ch. 7).
+/// Bound on the peak of `|S|`: a usual one (Åström and Hägglund, *Advanced PID Control*, 2006, ch. 7).
 pub const SENSITIVITY_PEAK: f64 = 1.7;
+/// Bound on the peak of `|T|`, from the same source.
 pub const COMPLEMENTARY_PEAK: f64 = 1.5;
 /// Shares by which a search keeps away from its bounds, in turn until the loop keeps them.
-pub(super) const TIGHTER: [f64; 4] = [0.0002, 0.001, 0.005, 0.02];
-/// Ratios Kd/Kp, s, and ratios Ki/Kp over the inverse of that, of the grid.
+pub(super) const BOUND_RESERVES: [f64; 4] = [0.0002, 0.001, 0.005, 0.02];
+/// Lowest and highest ratio Kd/Kp of the grid, s.
 const RATIOS_S: (f64, f64) = (3e-5, 0.3);
+/// Number of these ratios.
 const RATIOS: usize = 28;
+/// Lowest and highest ratio Ki/Kp of the grid, over the inverse of Kd/Kp.
 const INTEGRAL_RATIOS: (f64, f64) = (2e-3, 2.0);
+/// Number of these ratios.
 const INTEGRALS: usize = 14;
-/// Points of the grid from which simplices start; their edges, in the logarithm of a gain, one after the other; and the steps of
-/// each.
+/// Points of the grid from which simplices start.
 const STARTS: usize = 5;
+/// Edges of the simplices, one after the other, in the logarithm of a gain.
 const EDGES: [f64; 3] = [0.2, 0.05, 0.02];
+/// Steps of each simplex.
 const STEPS: u64 = 120;
 /// Price of a bound that is exceeded: the logarithm of the error for that of the excess, some ten times what it can gain.
 const PENALTY: f64 = 30.0;
 /// Price of a loop that is not stable.
-const UNSTABLE: f64 = 1e3;
-/// Frequencies, even on a log scale, from the lowest, Hz, to the highest, over the control rate or, in continuous time, Hz.
+const UNSTABLE_PENALTY: f64 = 1e3;
+/// Lowest frequency, Hz.
 const LOWEST_HZ: f64 = 0.1;
+/// Highest frequency over the control rate.
 const HIGHEST_SHARE: f64 = 0.49;
+/// Highest frequency in continuous time, Hz.
 const HIGHEST_HZ: f64 = 1e4;
+/// Number of frequencies, even on a log scale.
 const FREQUENCIES: usize = 400;
 
 /// A loop at a frequency.
@@ -222,7 +230,7 @@ impl Search {
                 }
             }
             if !winding.is_stable() {
-                return UNSTABLE;
+                return UNSTABLE_PENALTY;
             }
         }
         0.5 * (squares / PI).ln() + PENALTY * 0.5 * excess.ln()

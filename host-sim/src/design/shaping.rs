@@ -85,7 +85,7 @@ pub(super) fn proportional_derivative(
     }
 }
 
-/// The PD gains with which the loop has both margins, at whatever frequencies come out; Ki is zero.
+/// The PD gains with which the loop has both margins, at the frequencies that result; Ki is zero.
 ///
 /// The two equations are solved as one: at a given ratio Kd/Kp the frequency of the gain margin is fixed and Kp follows
 /// from it, so that the phase margin is a function of the ratio alone. Where several ratios fit, the largest is taken,
@@ -175,10 +175,10 @@ pub fn shape_to_crossover(
     };
     // Of the order of each other at the crossover, so that neither is lost to rounding.
     let (proportional, derivative) = (alone(1.0, 0.0), alone(1.0, 1.0 / omega) - alone(1.0, 0.0));
-    let wanted = Complex64::cis(phase_margin_deg.to_radians() - PI);
+    let target = Complex64::cis(phase_margin_deg.to_radians() - PI);
     let determinant = proportional.re * derivative.im - proportional.im * derivative.re;
-    let kp = (wanted.re * derivative.im - wanted.im * derivative.re) / determinant;
-    let kd = (proportional.re * wanted.im - proportional.im * wanted.re) / determinant / omega;
+    let kp = (target.re * derivative.im - target.im * derivative.re) / determinant;
+    let kd = (proportional.re * target.im - proportional.im * target.re) / determinant / omega;
     if kp > 0.0 && kd >= 0.0 {
         return Ok(proportional_derivative(kp, kd, derivative_filter_s));
     }

@@ -103,8 +103,8 @@ pub fn step_response(
     }
 }
 
-/// The band around the height in which a response counts as settled.
-const SETTLED: f64 = 0.02;
+/// Largest deviation from the final height, over that height, of a settled response.
+const SETTLING_BAND: f64 = 0.02;
 
 impl StepResponse {
     /// Its properties; a time is not a number if the response does not get there.
@@ -119,7 +119,7 @@ impl StepResponse {
         };
         let first_above = |level: f64| time(share.iter().position(|&y| y >= level));
         let peak = (0..share.len()).max_by(|&a, &b| share[a].total_cmp(&share[b]));
-        let last_outside = share.iter().rposition(|y| (y - 1.0).abs() > SETTLED);
+        let last_outside = share.iter().rposition(|y| (y - 1.0).abs() > SETTLING_BAND);
         let settled = last_outside.map_or(0, |index| index + 1);
         StepProperties {
             rise_time_s: first_above(0.9) - first_above(0.1),

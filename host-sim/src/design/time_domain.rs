@@ -35,7 +35,7 @@ impl Run {
         (squares[9] / squares[4]).sqrt()
     }
 
-    /// The loop with `error` of the position; `observe` is told the share of the time, the voltage and the position, period by period.
+    /// The loop with `error` of the position; `observe` receives the share of the time, the voltage and the position, period by period.
     fn periods(&self, mut error: impl FnMut(f64) -> f64, mut observe: impl FnMut(f64, f64, f64)) {
         let periods = (self.seconds / PERIOD_S) as usize;
         let whole_delay = (self.plant.delay_s / PERIOD_S + 1e-9).floor();

@@ -21,7 +21,7 @@ use super::held_plant::{HeldPlant, HeldPlantRun};
 pub enum Switching {
     /// Always at the largest.
     Constant,
-    /// Largest for half of each period, whatever the error does.
+    /// Largest for half of each period, independent of the error.
     Periodic {
         /// Switching frequency, Hz.
         frequency_hz: f64,
@@ -58,13 +58,13 @@ pub struct VaryingLoop<'a> {
 /// The error at the start, mm: small, so that the law's own bound on the error stays far even from a growing motion.
 const START_MM: f64 = 1e-6;
 /// A motion this many times the start is unstable, and need not be followed further.
-const ESCAPED: f64 = 1e6;
-/// Time that a motion is followed for, s.
-const FOLLOWED_S: f64 = 1.5;
+const UNSTABLE_GROWTH: f64 = 1e6;
+/// Time that is simulated, s.
+const SIMULATED_S: f64 = 1.5;
 /// Far beyond every voltage of these motions.
 const NO_LIMIT_V: f64 = 1e6;
 /// Largest gain of the search, as a factor on its start.
-const SEARCHED: f64 = 8.0;
+const MAX_GAIN_FACTOR: f64 = 8.0;
 /// Halvings of each search.
 const HALVINGS: usize = 12;
 /// Frequencies of each family of switching gains, over two octaves on each side of the crossover.
@@ -84,7 +84,7 @@ impl VaryingLoop<'_> {
         let mut filtered = FiltersState::default();
         let mut previous = -START_MM;
         pid.reset(&mut state, previous);
-        let samples = (FOLLOWED_S / period_s) as usize;
+        let samples = (SIMULATED_S / period_s) as usize;
         let mut squares = [0.0; 10];
         for sample in 0..samples {
             let error = -axis.position_mm();
@@ -103,7 +103,7 @@ impl VaryingLoop<'_> {
                 }
             };
             previous = error;
-            if error.abs() > ESCAPED * START_MM {
+            if error.abs() > UNSTABLE_GROWTH * START_MM {
                 return f64::INFINITY;
             }
             let scaled = if high { gain * error } else { error };
@@ -118,7 +118,7 @@ impl VaryingLoop<'_> {
     /// nothing up to eight times `from`.
     pub fn smallest_unstable(&self, from: f64, switching: Switching) -> Option<f64> {
         let grows = |gain: f64| self.growth(gain, switching) > 1.0;
-        let (mut low, mut high) = (from, SEARCHED * from);
+        let (mut low, mut high) = (from, MAX_GAIN_FACTOR * from);
         if !grows(high) {
             return None;
         }

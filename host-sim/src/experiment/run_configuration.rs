@@ -202,7 +202,7 @@ fn set_exact_friction(stage: &mut StageSettings, truth: &StageParameters) {
 }
 
 /// Viscous friction as a run at constant velocity shows it: sigma, and the linear damping B / A, which no motion
-/// can tell from it.
+/// can distinguish from it.
 fn with_total_damping(model: &StaticFriction, truth: &AxisParameters) -> StaticFriction {
     StaticFriction {
         viscous_v_s_per_mm: model.viscous_v_s_per_mm + truth.damping_per_s / truth.gain_mm_per_v_s2,

@@ -30,8 +30,9 @@ pub struct SineTestOutcome {
     pub chatter_v: f64,
 }
 
-/// Cycles at full speed, and those of them that count.
+/// Cycles at full speed.
 const CYCLES: f64 = 2.25;
+/// Whole cycles at the end that are scored.
 const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;

@@ -59,9 +59,9 @@ impl Rounding {
         let half = (0.5 * turn).tan();
         // A corner is 1 / cos(turn / 2) - 1 radii from its arc.
         let share = 2.0 * (0.25 * turn).sin().powi(2) / (0.5 * turn).cos();
-        let wanted = deviation_mm / share * half;
+        let needed_mm = deviation_mm / share * half;
         let shorter = before.segment.length_mm().min(after.segment.length_mm());
-        let taken_mm = wanted.min(0.5 * shorter);
+        let taken_mm = needed_mm.min(0.5 * shorter);
         let radius_mm = taken_mm / half;
         let inwards = (leaving - arriving * cos) / sin;
         let centre = corner - arriving * taken_mm + inwards * radius_mm;

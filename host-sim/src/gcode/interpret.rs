@@ -65,7 +65,7 @@ impl Program {
                 most: MOST_BYTES,
             });
         }
-        // Comments are in whatever character set the machine has.
+        // Comments are in the machine's own character set.
         let text = std::fs::read(path).map_err(unreadable)?;
         Self::parse(&String::from_utf8_lossy(&text))
     }

@@ -1,6 +1,6 @@
 //! Runs: stretches of the path that take one rise and one fall of speed, so that acceleration is carried through their joints.
 //!
-//! A long move is a run by itself: it reaches its speed, whatever comes before it. Short ones, of which curves are written, are
+//! A long move is a run by itself: it reaches its speed, after any move. Short ones, of which curves are written, are
 //! joined as long as they are tangent. A run that is faster somewhere than a move of it allows is divided about the slowest of them,
 //! until none is.
 

@@ -191,7 +191,7 @@ impl Segment {
 mod tests {
     use super::*;
 
-    /// Three quarters of a helix of 10 mm radius about (1, 2), rising by 3 mm.
+    /// 3/4 of a turn of a helix of 10 mm radius about (1, 2), rising by 3 mm.
     fn helix() -> Segment {
         let units = [Vector::x(), Vector::y()];
         Segment::arc(

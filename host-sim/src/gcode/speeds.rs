@@ -9,7 +9,7 @@ use crate::gcode::velocity_profile::Pace;
 
 /// Limits of the motion along a path, of the axes and of the path.
 ///
-/// Each axis' acceleration limit is shared out, so that the sampled motion keeps it whatever comes together: 0.88 of it
+/// Each axis' acceleration limit is shared out, so that the sampled motion keeps it in every combination: 0.88 of it
 /// for curves and changes of speed, 0.1 for the small corner at a joint that is tangent only within tolerance, taken in
 /// one control period, and the rest for an arc's allowed mismatch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,8 +31,9 @@ pub struct Limits {
     pub rate_hz: f64,
 }
 
-/// Shares of an axis' acceleration.
+/// Share of an axis' acceleration for curves and changes of speed.
 const CURVE_SHARE: f64 = 0.88;
+/// Share of it for the corner at a joint.
 const JOINT_SHARE: f64 = 0.1;
 /// Of an arc's part, the share for changes of speed; what is left for the curve makes a right angle with it.
 const ARC_TANGENTIAL_SHARE: f64 = 0.5;

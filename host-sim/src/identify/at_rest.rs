@@ -27,8 +27,8 @@ pub struct AtRest {
 /// Lowest coherence of a line that a revision counts: with friction no response is quite coherent.
 const LEAST_COHERENCE: f64 = 0.8;
 
-/// Relative difference from which on two rates are not the same.
-const UNEQUAL: f64 = 1e-3;
+/// Largest relative difference of two rates that count as equal.
+const MAX_RATE_DIFFERENCE: f64 = 1e-3;
 
 impl AtRest {
     /// Excites the axis at rest under the feedback of `settings`, for `periods` periods.
@@ -75,7 +75,7 @@ impl AtRest {
         rate_hz: f64,
         excitation: Excitation,
     ) -> Result<Self, ReviseError> {
-        if (recording.sample_time_s * rate_hz - 1.0).abs() > UNEQUAL {
+        if (recording.sample_time_s * rate_hz - 1.0).abs() > MAX_RATE_DIFFERENCE {
             return Err(ReviseError::Rate {
                 recorded_hz: recording.sample_time_s.recip(),
                 rate_hz,

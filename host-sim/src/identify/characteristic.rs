@@ -55,7 +55,7 @@ pub struct Characteristic {
 pub enum CharacteristicError {
     /// The axis stays slow.
     #[error(
-        "the axis reached {reached_mm_s:.1} mm/s at {voltage_v:.2} V, not the {wanted_mm_s} mm/s asked for: ask for less, drive it longer, \
+        "the axis reached {reached_mm_s:.1} mm/s at {voltage_v:.2} V, not the {requested_mm_s} mm/s asked for: ask for less, drive it longer, \
          or allow more voltage"
     )]
     Slow {
@@ -64,7 +64,7 @@ pub enum CharacteristicError {
         /// With which voltage, V.
         voltage_v: f64,
         /// Velocity asked for, mm/s.
-        wanted_mm_s: f64,
+        requested_mm_s: f64,
     },
     /// The axis does not come to rest.
     #[error(
@@ -86,8 +86,9 @@ pub enum CharacteristicError {
     Experiment(#[from] ExperimentError),
 }
 
-/// Voltage of the first try, V, and the factor to the next.
+/// Voltage of the first try, V.
 const FIRST_V: f64 = 0.1;
+/// Factor on the voltage from one try to the next.
 const RAISE: f64 = 1.25;
 /// Time over which a velocity is taken, s.
 const VELOCITY_S: f64 = 2e-3;
@@ -95,8 +96,8 @@ const VELOCITY_S: f64 = 2e-3;
 const DISTANCES: usize = 60;
 /// The smallest distance, in counts: below it the counts show.
 const LEAST_COUNTS: f64 = 8.0;
-/// A velocity that counts as rest, of the largest.
-const REST: f64 = 5e-3;
+/// Largest velocity that counts as rest, over the largest velocity of the record.
+const REST_SHARE: f64 = 5e-3;
 
 /// Runs passes with rising voltage until the speed is reached, and evaluates them.
 ///
@@ -130,7 +131,7 @@ pub fn measure(
             return Err(CharacteristicError::Slow {
                 reached_mm_s,
                 voltage_v,
-                wanted_mm_s: settings.velocity_mm_s,
+                requested_mm_s: settings.velocity_mm_s,
             });
         }
         voltage_v *= RAISE;
@@ -241,7 +242,7 @@ fn coasting(coast: &Recording) -> Result<Vec<(f64, f64)>, CharacteristicError> {
     let fastest =
         (0..velocities.len()).fold(0, |best, i| if speed(i) > speed(best) { i } else { best });
     let last = velocities.last().map_or(0.0, |velocity| velocity.abs());
-    if velocities.is_empty() || last > REST * speed(fastest) {
+    if velocities.is_empty() || last > REST_SHARE * speed(fastest) {
         return Err(CharacteristicError::Coasting {
             velocity_mm_s: last,
             coast_s: coast.duration_s(),

@@ -4,13 +4,13 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-/// Damping ratio of an anti-resonance from which on it is no dip.
-pub const TRANSMITS: f64 = 0.5;
+/// Least damping ratio of an anti-resonance at which the spring's own damper transmits force: it is no dip then.
+pub const MIN_TRANSMITTING_DAMPING: f64 = 0.5;
 
 /// A resonance, with the anti-resonance below it where the encoder is on the motor: the factor
 /// `(s^2 + 2 d_a w_a s + w_a^2) / (s^2 + 2 d w s + w^2) (w / w_a)^2` on the response of the rigid axis, or
 /// `w^2 / (s^2 + 2 d w s + w^2)` without one. Where the encoder is on the table, an anti-resonance above the mode with a damping
-/// ratio from [`TRANSMITS`] on is the spring's own damper, through which force reaches the table above the resonance.
+/// ratio from [`MIN_TRANSMITTING_DAMPING`] on is the spring's own damper, through which force reaches the table above the resonance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
     /// w / (2 pi), Hz.
@@ -38,7 +38,8 @@ impl Mode {
 
     /// True if the encoder is on the motor's side of the spring.
     pub fn is_at_motor(&self) -> bool {
-        self.anti.is_some_and(|(_, damping)| damping < TRANSMITS)
+        self.anti
+            .is_some_and(|(_, damping)| damping < MIN_TRANSMITTING_DAMPING)
     }
 
     /// The mode at other frequencies by a factor, as when a mass on the axis has changed.

@@ -46,27 +46,30 @@ impl Default for MotorConstantSettings {
     }
 }
 
-/// Travel that the usual test needs at most, mm, and the shortest dwell over the usual one.
+/// Largest travel of the usual test, mm.
 const ROOM_MM: f64 = 40.0;
-const SHORTEST: f64 = 0.4;
-/// Fewest levels, a multiple of two, and factor on the dwell of a test that was stopped for its way; most such tests, and the
-/// shortest dwell, s.
+/// Shortest dwell over the usual one.
+const MIN_DWELL_RATIO: f64 = 0.4;
+/// Fewest levels, a multiple of two.
 const LEAST_LEVELS: usize = 14;
-const SHORTENED: f64 = 0.75;
+/// Factor on the dwell after a test that was stopped because it went too far.
+const DWELL_REDUCTION: f64 = 0.75;
+/// Largest number of such tests.
 const TESTS_TOO_FAR: usize = 14;
+/// Shortest dwell, s.
 const LEAST_DWELL_S: f64 = 0.0015;
 /// Dwells that are tried over the usual one where a test is too uncertain.
 const OTHER_DWELLS: [f64; 3] = [1.7, 0.6, 2.4];
-/// Share of the travel beyond which the next test begins towards the middle.
-const OUTSIDE: f64 = 0.25;
-/// Share of the travel by which an axis comes nearer to the middle at least that is not held.
-const BACK: f64 = 0.01;
+/// Distance from the middle over the travel, from which on the next test begins towards the middle.
+const MAX_START_SHARE: f64 = 0.25;
+/// Least return towards the middle, over the travel, of an axis that friction does not hold.
+const MIN_RETURN_SHARE: f64 = 0.01;
 
 impl MotorConstantSettings {
     /// Shorter levels where the travel, either way, is short: the way goes with the square of the time.
     #[must_use]
     pub fn fitted_to(self, travel_mm: f64) -> Self {
-        let share = (travel_mm / ROOM_MM).sqrt().clamp(SHORTEST, 1.0);
+        let share = (travel_mm / ROOM_MM).sqrt().clamp(MIN_DWELL_RATIO, 1.0);
         Self {
             dwell_s: share * self.dwell_s,
             ..self
@@ -103,7 +106,7 @@ impl MotorConstantSettings {
     fn shortened(self) -> Self {
         let levels = (self.levels * 2 / 3).max(LEAST_LEVELS);
         let dwell_s = if levels == self.levels {
-            (SHORTENED * self.dwell_s).max(LEAST_DWELL_S)
+            (DWELL_REDUCTION * self.dwell_s).max(LEAST_DWELL_S)
         } else {
             self.dwell_s
         };
@@ -247,35 +250,38 @@ pub enum MotorConstantError {
 const GENTLE_RATIO: f64 = 1.6;
 /// Factor by which the levels rise from test to test.
 const RAISE: f64 = 1.3;
-/// Friction in motion over the mean of the levels, at least and at most: some of the mean accelerates.
+/// Least friction in motion over the mean of the levels: the rest of the mean accelerates.
 const LEAST_FRICTION: f64 = 0.457;
+/// Largest friction in motion over the mean of the levels.
 const MOST_FRICTION: f64 = 0.857;
-/// Factor by which the level is lowered of a direction in which the axis went too far.
-const LOWER: f64 = 1.2;
-/// Factor from a level at which the axis went too far to the largest that is tried after it, in shorter tests.
-const RECKLESS: f64 = 1.7;
-/// Least factor from a level that holds to one that goes too far between which another one is tried.
-const NARROW: f64 = 1.06;
+/// Divisor of the level of a direction in which the axis went too far.
+const LEVEL_REDUCTION: f64 = 1.2;
+/// Largest level that is tried in shorter tests after the axis went too far, over the level at which it did.
+const MAX_RETRY_RATIO: f64 = 1.7;
+/// Least ratio of a level that goes too far to one that friction holds for which a level between them is tried.
+const MIN_LEVEL_RATIO: f64 = 1.06;
 /// Levels at the beginning of a pass that do not count: the axis breaks away.
-const BREAKING_AWAY: usize = 6;
+const BREAKAWAY_LEVELS: usize = 6;
 /// Time in which the voltage of a gentle test rises, s: one and a half periods of a mode of 30 Hz.
 const RISE_S: f64 = 0.05;
 /// Voltage from which on a sample belongs to a pass, V.
 const DRIVING_V: f64 = 0.01;
 /// Time at rest between passes, s.
 const REST_S: f64 = 0.1;
-/// Slowest sliding in a level's dwell: counts of the encoder that are enough, those that are needed, and the way that will do
-/// with fewer than are enough, mm, in the usual dwell.
+/// Least way of the slowest sliding in the usual dwell that suffices, counts.
 const SLIDING_COUNTS: f64 = 600.0;
+/// Least way in any case, counts.
 const LEAST_COUNTS: f64 = 60.0;
+/// Way that suffices with fewer counts than [`SLIDING_COUNTS`], mm.
 const SLIDING_MM: f64 = 0.3;
-/// Slowest sliding over the mean in a gentle test, from level to level.
-const EVEN: f64 = 0.4;
-/// Dead times tried, s.
+/// Least speed over the mean in a gentle test, from level to level.
+const MIN_SPEED_RATIO: f64 = 0.4;
+/// Step between the dead times that are tried, s.
 const DELAY_STEP_S: f64 = 1e-4;
+/// Longest dead time that is tried, s.
 const LONGEST_DELAY_S: f64 = 6e-3;
-/// The same over the dwell.
-const LONGEST_DELAY: f64 = 0.8;
+/// Longest dead time that is tried, over the dwell.
+const MAX_DELAY_RATIO: f64 = 0.8;
 /// Largest relative standard error.
 const MOST_UNCERTAIN: f64 = 0.2;
 
@@ -320,7 +326,7 @@ impl Level {
     fn lower(&mut self) {
         self.too_far_v = self.too_far_v.min(self.volts);
         self.ever_too_far_v = self.ever_too_far_v.min(self.volts);
-        self.volts = (self.volts / LOWER).max(self.between());
+        self.volts = (self.volts / LEVEL_REDUCTION).max(self.between());
     }
 
     /// The middle between what held and what went too far; not a number or without an end where either is unknown.
@@ -330,13 +336,13 @@ impl Level {
 
     /// True if there is no level left between what holds and what goes too far.
     fn is_narrow(&self) -> bool {
-        self.too_far_v < NARROW * self.held_v
+        self.too_far_v < MIN_LEVEL_RATIO * self.held_v
     }
 
     /// True if it is so far above one at which the axis went too far that no shorter test makes up for it: the axis gathers speed before it
     /// can be stopped.
-    fn is_reckless(&self) -> bool {
-        self.volts > RECKLESS * self.ever_too_far_v
+    fn exceeds_retry_limit(&self) -> bool {
+        self.volts > MAX_RETRY_RATIO * self.ever_too_far_v
     }
 
     /// True if no level below one that goes too far is known to be worth a try: nothing holds, as where something hangs, or
@@ -346,7 +352,7 @@ impl Level {
     }
 }
 
-/// Runs the test on the test_axis's axis, with rising levels until the axis slides; gently where that goes too far or is too uncertain.
+/// Runs the test on the axis under test, with rising levels until the axis slides; gently where that goes too far or is too uncertain.
 ///
 /// # Errors
 /// An axis that does not slide, moves the wrong way, or is too uncertain; a run that is stopped.
@@ -386,7 +392,7 @@ fn search(
     // In positive and in negative direction: friction may differ, and what hangs pulls one way.
     let mut levels = [Level::at(settings.first_level_v); 2];
     // From near an end, away from it.
-    let mut ahead = if axis.start_mm > OUTSIDE * axis.travel_mm {
+    let mut ahead = if axis.start_mm > MAX_START_SHARE * axis.travel_mm {
         -1.0
     } else {
         1.0
@@ -399,7 +405,7 @@ fn search(
         .iter()
         .all(|level| level.volts <= settings.most_level_v)
     {
-        if levels.iter().any(Level::is_reckless)
+        if levels.iter().any(Level::exceeds_retry_limit)
             && let Some(error) = too_far.take()
         {
             return Err(MotorConstantError::Experiment(error));
@@ -442,7 +448,7 @@ fn search(
             }
             outcome => outcome?,
         };
-        ahead = inwards(&recording, OUTSIDE * axis.travel_mm, ahead);
+        ahead = inwards(&recording, MAX_START_SHARE * axis.travel_mm, ahead);
         let only_returned = must_return;
         must_return = ended_farther_out(&recording, axis.travel_mm);
         if only_returned {
@@ -523,7 +529,7 @@ fn ended_farther_out(recording: &Recording, travel_mm: f64) -> bool {
         return false;
     };
     let inwards_mm = last_mm.signum() * (first_mm - last_mm);
-    last_mm.abs() > OUTSIDE * travel_mm && inwards_mm < BACK * travel_mm
+    last_mm.abs() > MAX_START_SHARE * travel_mm && inwards_mm < MIN_RETURN_SHARE * travel_mm
 }
 
 /// The voltage of all passes, V; the first goes `ahead`, 1 or -1.
@@ -592,7 +598,7 @@ fn find_passes(
             .iter()
             .map(|volts| volts.abs())
             .collect();
-        let from = begin + Levels::of(&pass_v).first + BREAKING_AWAY * dwell;
+        let from = begin + Levels::of(&pass_v).first + BREAKAWAY_LEVELS * dwell;
         if end >= from + 4 * dwell {
             let positions = &recording.position_mm[from..end];
             let slowest = |window: usize| {
@@ -605,7 +611,7 @@ fn find_passes(
                 // From one upper level to the next: a motor on a soft spring swings back between them, though the table slides on.
                 let way = sign * (positions[positions.len() - 1] - positions[0]);
                 let mean = way * (2 * dwell) as f64 / positions.len() as f64;
-                slowest(2 * dwell) > (LEAST_COUNTS * resolution_mm).max(EVEN * mean)
+                slowest(2 * dwell) > (LEAST_COUNTS * resolution_mm).max(MIN_SPEED_RATIO * mean)
             } else {
                 slowest(dwell) > sliding_mm
             };
@@ -725,7 +731,7 @@ fn fit_pass(recording: &Recording, begin: usize, from: usize, end: usize, lag: u
     };
     let mut best = (f64::INFINITY, none);
     // A delay of a whole level would swap the two.
-    let longest_s = LONGEST_DELAY_S.min(LONGEST_DELAY * lag as f64 * step_s);
+    let longest_s = LONGEST_DELAY_S.min(MAX_DELAY_RATIO * lag as f64 * step_s);
     let longest = ((longest_s / step_s) as usize).min(from - begin);
     for delay in (0..=longest).step_by(((DELAY_STEP_S / step_s) as usize).max(1)) {
         let push = integral(&recording.voltage_v[from - delay..end - delay], 0.0, step_s);
@@ -785,13 +791,16 @@ fn is_uncertain(gain: f64, standard_error: f64) -> bool {
     !(gain > 0.0 && standard_error <= MOST_UNCERTAIN * gain)
 }
 
-/// Frequencies of a mode that are tried, Hz, even on a log scale; its damping ratio, and dead times, s.
+/// Lowest and highest frequency of a mode that is tried, Hz.
 const MODES_HZ: (f64, f64) = (20.0, 250.0);
+/// Number of these frequencies, even on a log scale.
 const MODES: usize = 45;
+/// Damping ratio of such a mode.
 const MODE_DAMPING: f64 = 0.03;
+/// Dead times that are tried with it, s.
 const MODE_DELAYS_S: [f64; 5] = [0.2e-3, 0.8e-3, 1.5e-3, 2.3e-3, 3.3e-3];
-/// Every so many samples count: they are much denser than what the passes hold.
-const THINNED: usize = 5;
+/// Every THINNING-th sample counts: samples are much denser than what the passes hold.
+const THINNING: usize = 5;
 
 /// The passes of an axis that rings with a structural mode: what an oscillator does under the same voltage is a further part
 /// of the motion, with the frequency that leaves the least over all passes.
@@ -857,7 +866,7 @@ fn fit_ringing(
     let second = |signal: &[f64]| -> Vec<f64> {
         signal
             .windows(2 * lag + 1)
-            .step_by(THINNED)
+            .step_by(THINNING)
             .map(|window| window[2 * lag] - 2.0 * window[lag] + window[0])
             .collect()
     };

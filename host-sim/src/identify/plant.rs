@@ -17,7 +17,7 @@ use num_complex::Complex64;
 use quadrant_law::control::plant_model::PlantModel;
 
 use super::fit::{Fit, FitError, Loss, Parameter, fit, fit_nearest};
-use super::mode::{self, Mode, TRANSMITS};
+use super::mode::{self, MIN_TRANSMITTING_DAMPING, Mode};
 use super::response::{FrequencyResponse, ResponsePoint};
 
 /// Spring to ground in the model.
@@ -123,15 +123,15 @@ pub enum PlantError {
     /// The corner that separates damping from mass is not in the band.
     #[error(
         "the response from {low_hz:.1} to {high_hz:.1} Hz misses the corner at {corner_hz:.1} Hz, where damping gives way to mass, \
-         so that A and B cannot be told apart; measure from {wanted_low_hz:.1} to {wanted_high_hz:.1} Hz at least"
+         so that A and B cannot be distinguished; measure from {needed_low_hz:.1} to {needed_high_hz:.1} Hz at least"
     )]
     MissesCorner {
         low_hz: f64,
         high_hz: f64,
         /// B / (2 pi) as far as it is known.
         corner_hz: f64,
-        wanted_low_hz: f64,
-        wanted_high_hz: f64,
+        needed_low_hz: f64,
+        needed_high_hz: f64,
     },
     /// A parameter is not determined.
     #[error(
@@ -182,13 +182,15 @@ const DELAYS: usize = 500;
 const TRIED_DELAYS: usize = 30;
 /// Largest relative standard error of A and B.
 const MOST_UNCERTAIN: f64 = 0.25;
-/// Corner of a damping that may stay unknown, over the lowest frequency.
-const NEGLIGIBLE: f64 = 0.7;
-/// A misfit that no noise explains.
+/// Largest corner frequency of a damping that may stay unknown, over the lowest frequency.
+const NEGLIGIBLE_CORNER_RATIO: f64 = 0.7;
+/// Largest misfit of the gain that noise explains, dB.
 const MOST_GAIN_DB: f64 = 3.0;
+/// Largest misfit of the phase that noise explains, degrees.
 const MOST_PHASE_DEG: f64 = 20.0;
-/// A misfit in each band behind which no mode is looked for.
+/// Misfit of the gain in each band up to which no mode is looked for, dB.
 const SMALL_GAIN_DB: f64 = 0.4;
+/// Misfit of the phase in each band up to which no mode is looked for, degrees.
 const SMALL_PHASE_DEG: f64 = 3.0;
 /// A relative deviation below which a line is not believed to be: some error does not scatter.
 const LEAST_DEVIATION: f64 = 1e-4;
@@ -217,7 +219,7 @@ pub fn fit_plant(
             least_coherence: settings.least_coherence,
         });
     }
-    // A spring's damper and the dead time both bend the phase: where the response does not tell them apart, there is none.
+    // A spring's damper and the dead time both bend the phase: where the response does not distinguish them, there is none.
     fit_lines(&lines, settings, true).or_else(|_| fit_lines(&lines, settings, false))
 }
 
@@ -343,22 +345,26 @@ impl Model {
 const MOST_MODES: usize = 2;
 /// Factor by which a mode makes the weighted squares smaller at least.
 pub const LEAST_DROP: f64 = 2.0;
-/// Lowest frequency of a mode, Hz, and the highest over that of the highest line.
+/// Lowest frequency of a mode, Hz.
 const LOWEST_MODE_HZ: f64 = 12.0;
+/// Highest frequency of a mode over that of the highest line.
 const HIGHEST_MODE: f64 = 1.05;
-/// Starts over the band, and the number of lines that they are tried on.
+/// Starts of a mode over the band.
 const STARTS: usize = 14;
+/// Number of lines on which the starts are tried.
 const TRIED_LINES: usize = 160;
-/// Bounds of a damping ratio, and its start.
+/// Least and largest damping ratio of a mode.
 const DAMPINGS: (f64, f64) = (1e-3, 0.5);
+/// Damping ratio from which its fit starts.
 const DAMPING_START: f64 = 0.03;
 /// Start of an anti-resonance over the mode's frequency: of equal masses.
 const ANTI_START: f64 = 0.7;
-/// Start of a damper that transmits force above the mode: damping ratio of the mode, and frequency over the mode's.
+/// Damping ratio of a mode from which the fit with a damper that transmits force starts.
 const STRONG_START: f64 = 0.1;
+/// Frequency of that damper over the mode's from which the fit starts.
 const DAMPER_START: f64 = 6.0;
-/// Bounds of its damping ratio.
-const DAMPERS: (f64, f64) = (TRANSMITS, 5.0);
+/// Least and largest damping ratio of that damper.
+const DAMPERS: (f64, f64) = (MIN_TRANSMITTING_DAMPING, 5.0);
 /// Largest relative standard error of a mode's frequency.
 const MOST_UNCERTAIN_MODE: f64 = 0.05;
 
@@ -400,7 +406,7 @@ fn with_modes(
         // A damper has no frequency of its own.
         let determined = (first..fit.0.values.len())
             .step_by(2)
-            .filter(|index| fit.0.values[index + 1] < TRANSMITS)
+            .filter(|index| fit.0.values[index + 1] < MIN_TRANSMITTING_DAMPING)
             .all(|index| fit.0.standard_errors[index] < MOST_UNCERTAIN_MODE * fit.0.values[index]);
         if !better || !determined {
             break;
@@ -542,7 +548,7 @@ fn search(
     for (mode, names) in whole.modes.iter().zip(MODE_NAMES) {
         let pairs = [Some((mode.frequency_hz, mode.damping)), mode.anti];
         for ((frequency_hz, damping), names) in pairs.into_iter().flatten().zip(names.chunks(2)) {
-            let (frequencies, dampings) = if damping < TRANSMITS {
+            let (frequencies, dampings) = if damping < MIN_TRANSMITTING_DAMPING {
                 ((0.5 * LOWEST_MODE_HZ, 1.5 * highest_hz), DAMPINGS)
             } else {
                 ((0.5 * LOWEST_MODE_HZ, DAMPER_START * highest_hz), DAMPERS)
@@ -585,15 +591,15 @@ fn check_support(
         let deviation = relative(index);
         deviation.is_nan() || deviation > MOST_UNCERTAIN
     };
-    let negligible = negligible_damping && corner_hz < NEGLIGIBLE * low_hz;
-    let told_apart = !uncertain(1) && low_hz <= 1.5 * corner_hz.max(0.1);
-    if uncertain(0) || high_hz < 1.5 * corner_hz || !(negligible || told_apart) {
+    let negligible = negligible_damping && corner_hz < NEGLIGIBLE_CORNER_RATIO * low_hz;
+    let distinguishable = !uncertain(1) && low_hz <= 1.5 * corner_hz.max(0.1);
+    if uncertain(0) || high_hz < 1.5 * corner_hz || !(negligible || distinguishable) {
         return Err(PlantError::MissesCorner {
             low_hz,
             high_hz,
             corner_hz,
-            wanted_low_hz: 0.3 * corner_hz,
-            wanted_high_hz: 4.0 * corner_hz,
+            needed_low_hz: 0.3 * corner_hz,
+            needed_high_hz: 4.0 * corner_hz,
         });
     }
     // A dead time is known well enough when the phase it turns is, at the highest line that a loop can use: below a mode between motor and

@@ -21,8 +21,8 @@ const POINTS: usize = 200;
 const AMPLITUDES: [f64; 2] = [1.0, 1.0 / 3.0];
 /// Cycles before a loop is closed: a slack bristle forgets its start within the first.
 const CYCLES: usize = 4;
-/// Smallest stiffness over that of all elements together; the largest is theirs, since no virgin curve starts steeper.
-const SOFTEST: f64 = 1e-3;
+/// Least stiffness over that of all elements together; the largest is theirs, since no virgin curve starts steeper.
+const MIN_STIFFNESS_SHARE: f64 = 1e-3;
 
 /// A single-state model and how well it does.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,7 +124,7 @@ fn stiffness(gms: &GmsParameters) -> Parameter {
     Parameter {
         name: "sigma0",
         start: 0.5 * total,
-        bounds: (SOFTEST * total, total),
+        bounds: (MIN_STIFFNESS_SHARE * total, total),
     }
 }
 

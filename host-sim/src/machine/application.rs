@@ -145,7 +145,7 @@ impl<S: Scalar> Running<S> {
 
     /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.
     pub fn tick(&mut self, inputs: &TickInput, serial: &mut impl Serial) -> (Outputs, Poll) {
-        self.control.hear(self.intake.frames());
+        self.control.note_requests(self.intake.frames());
         let outputs = self.control.tick(&mut Inputs {
             command: self.commands.pop_front(),
             ..inputs.inputs()

@@ -1,21 +1,24 @@
-//! Moving a test_axis's axis to a position between experiments.
+//! Moving an axis under test to a position between experiments.
 
 use quadrant_law::reference::{MotionSettings, PointToPointSettings};
 
 use super::test_axis::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis};
 use crate::record::Recording;
 
-/// Limits of the move: unhurried.
+/// Velocity of the move, mm/s: slow.
 const VELOCITY_MM_S: f64 = 30.0;
+/// Acceleration of the move, mm/s^2.
 const ACCELERATION_MM_S2: f64 = 300.0;
+/// Jerk of the move, mm/s^3.
 const JERK_MM_S3: f64 = 5e3;
 /// Share of the largest velocity that it takes at most.
 const MOST_VELOCITY: f64 = 0.5;
 /// Time in which it goes through the travel either way at least, s: on a short one a soft controller has no way to lag by.
 const TRAVEL_S: f64 = 2.0;
-/// Moves at most, and the share of the travel within which a soft controller comes near enough: further moves follow otherwise.
-const APPROACHES: usize = 4;
-const NEAR: f64 = 0.02;
+/// Largest number of moves.
+const MAX_MOVES: usize = 4;
+/// Distance over the travel within which the axis counts as there; otherwise a further move follows.
+const MAX_DISTANCE_SHARE: f64 = 0.02;
 /// Distance that is not worth a move, mm.
 const NEAR_MM: f64 = 0.05;
 /// Share of the travel by which a run may begin away from where it should.
@@ -28,8 +31,8 @@ const LOOK_S: f64 = 0.01;
 /// # Errors
 /// A move that is stopped.
 pub fn approach(test_axis: &mut dyn TestAxis, target_mm: f64) -> Result<(), ExperimentError> {
-    let near_mm = NEAR_MM.max(NEAR * test_axis.info().travel_mm);
-    for _ in 1..APPROACHES {
+    let near_mm = NEAR_MM.max(MAX_DISTANCE_SHARE * test_axis.info().travel_mm);
+    for _ in 1..MAX_MOVES {
         if approach_once(test_axis, target_mm)? < near_mm {
             return Ok(());
         }

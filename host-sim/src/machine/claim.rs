@@ -47,7 +47,7 @@ impl Claim {
 /// Locks the file of a name, and writes this process into it for others to read.
 fn lock(folder: &Path, name: &str) -> io::Result<File> {
     let path = folder.join(format!("{name}.lock"));
-    let told = |error: io::Error| {
+    let with_path = |error: io::Error| {
         let remedy = "remove it if it is no lock of a program that runs";
         io::Error::new(
             error.kind(),
@@ -63,7 +63,7 @@ fn lock(folder: &Path, name: &str) -> io::Result<File> {
             .mode(0o600)
             .custom_flags(rustix::fs::OFlags::NOFOLLOW.bits() as i32);
     }
-    let mut file = options.open(&path).map_err(told)?;
+    let mut file = options.open(&path).map_err(with_path)?;
     match file.try_lock() {
         Ok(()) => {
             file.set_len(0)?;
@@ -77,7 +77,7 @@ fn lock(folder: &Path, name: &str) -> io::Result<File> {
                 holder(&mut file)
             ),
         )),
-        Err(TryLockError::Error(error)) => Err(told(error)),
+        Err(TryLockError::Error(error)) => Err(with_path(error)),
     }
 }
 

@@ -42,7 +42,7 @@ pub struct EmulatedMachine {
     outputs: Outputs,
     pressed: Switches,
     /// Lines of the log that are complete, and those that came last.
-    told: Vec<String>,
+    complete: Vec<String>,
     recent: Vec<String>,
 }
 
@@ -87,7 +87,7 @@ impl EmulatedMachine {
             port,
             outputs: Outputs::default(),
             pressed: Switches::NONE,
-            told: Vec::new(),
+            complete: Vec::new(),
             recent: Vec::new(),
         })
     }
@@ -142,7 +142,7 @@ impl EmulatedMachine {
         let tick = self.lockstep.tick();
         let is_sure = |line: &String| stamp(line).is_none_or(|stamp| stamp < tick);
         let sure = self.recent.iter().take_while(|line| is_sure(line)).count();
-        let mut lines = std::mem::take(&mut self.told);
+        let mut lines = std::mem::take(&mut self.complete);
         lines.extend(self.recent.drain(..sure));
         Ok(lines)
     }
@@ -187,8 +187,8 @@ impl EmulatedMachine {
     /// Starts the firmware afresh: what is in flash stays, and the stage stands where it stands.
     fn restart(&mut self) -> Result<(), EmulatorError> {
         // The firmware that wrote them is gone: there will be no more of its last tick.
-        self.told.append(&mut self.recent);
-        self.told.extend(self.lockstep.new_lines()?);
+        self.complete.append(&mut self.recent);
+        self.complete.extend(self.lockstep.new_lines()?);
         self.port = HostPort {
             to_host: std::mem::take(&mut self.port.to_host),
             room: self.port.room,

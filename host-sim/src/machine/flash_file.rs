@@ -30,7 +30,7 @@ impl FlashFile {
                 file.keep(&erased)?;
                 return Ok(file);
             }
-            Err(error) => return Err(told(path, "cannot be read", &error)),
+            Err(error) => return Err(with_path(path, "cannot be read", &error)),
         };
         if kept.len() != bytes {
             return Err(io::Error::other(format!(
@@ -50,7 +50,7 @@ impl FlashFile {
         &self.kept
     }
 
-    /// Keeps what the flash holds now. Whoever is interrupted leaves the old or the new content.
+    /// Keeps what the flash holds now. An interruption leaves the old or the new content.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -59,14 +59,14 @@ impl FlashFile {
             return Ok(());
         }
         whole::write(&self.path, content)
-            .map_err(|error| told(&self.path, "cannot be written", &error))?;
+            .map_err(|error| with_path(&self.path, "cannot be written", &error))?;
         self.kept.clear();
         self.kept.extend(content);
         Ok(())
     }
 }
 
-fn told(path: &Path, what: &str, error: &io::Error) -> io::Error {
+fn with_path(path: &Path, what: &str, error: &io::Error) -> io::Error {
     io::Error::new(error.kind(), format!("{} {what}: {error}", path.display()))
 }
 

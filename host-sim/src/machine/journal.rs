@@ -57,7 +57,7 @@ pub struct Begun {
 #[derive(Serialize, Deserialize)]
 struct Entry {
     name: String,
-    /// Tells the experiment and its settings from others.
+    /// Distinguishes the experiment and its settings from others.
     key: u64,
     /// Of an experiment that was stopped, up to there, if anything is left of it.
     recording: Option<Recording>,
@@ -107,7 +107,7 @@ impl Entry {
         }
         if self.sum != self.total() {
             return Err(format!(
-                "{}, sum: {}, and what is there comes to {}: the file was changed since it was written",
+                "{}, sum: {}, and its content comes to {}: the file was changed since it was written",
                 path.display(),
                 self.sum,
                 self.total()

@@ -13,7 +13,7 @@
 //!        ^-------------------------------- EmulatedMachine: its image in QEMU
 //! ```
 //!
-//! - [`Machine`], [`TestAxis`]: a machine and an axis that are measured, whatever they are made of;
+//! - [`Machine`], [`TestAxis`]: a machine and an axis that are measured, of any kind;
 //! - [`law`]: the control law and the supervisor alone;
 //! - [`simulated`], [`application`], [`memory_flash`]: the firmware's application in this process;
 //! - [`emulated`], [`emulator`] (feature `emulated`): the firmware's image in QEMU; [`benchmark_job`]: the motion that it is

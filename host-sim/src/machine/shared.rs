@@ -1,8 +1,8 @@
-//! A machine that this program holds and lets others look at: they see what it hears, and may stop the axes.
+//! A machine that this program holds and lets others look at: they see what it receives, and may stop the axes.
 //!
-//! Viewers speak the link's protocol over a socket, so the same client serves. States are those that the machine has told its
+//! Viewers speak the link's protocol over a socket, so the same client serves. States are those that the machine has reported to its
 //! holder last, as long as they are fresh. Of what viewers ask, nothing but `Stop` and `Disable` reaches the machine, so that a
-//! viewer is no host to a motion that needs one; it is answered by the machine, or told that no answer came.
+//! viewer is no host to a motion that needs one; it is answered by the machine, or informed that no answer came.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -32,21 +32,23 @@ pub const VIEWER_IDS: u16 = 0xFF00;
 pub const MOST_VIEWERS: usize = 16;
 /// Age from which on a state is not shown as that of now.
 const FRESH: Duration = Duration::from_secs(1);
-/// Time within which the machine answers what a viewer asked of it, or the viewer is told that it did not.
+/// Time within which the machine answers what a viewer asked of it, or the viewer learns that it did not.
 pub const PASSED_ON: Duration = Duration::from_millis(600);
-/// Time in which a new connection says its token and hello, and silence of a viewer after which its connection is closed.
+/// Time in which a new connection sends its token and hello.
 const GREETING: Duration = Duration::from_secs(2);
+/// Silence of a viewer after which its connection is closed.
 const SILENCE: Duration = Duration::from_secs(10);
 /// Notices that wait for a viewer; one that is slower misses the newest.
 const WAITING: usize = 1000;
-/// Time between two looks at what a viewer is to be told, and at what viewers ask for.
+/// Time between two looks at what a viewer is to receive, and at what viewers ask for.
 const LOOK: Duration = Duration::from_millis(20);
 /// Time in which a viewer takes what it is sent; after that it is gone.
 const TAKING: Duration = Duration::from_secs(2);
 /// Pause after a connection that could not be taken: without it, a system that has no more descriptors is asked in a circle.
 const REFUSED_PAUSE: Duration = Duration::from_millis(200);
-/// Random bytes of a token, and the longest that is read.
+/// Random bytes of a token.
 const TOKEN_BYTES: usize = 16;
+/// Longest token that is read, characters.
 const TOKEN_CHARS: usize = 2 * TOKEN_BYTES;
 
 /// A transport whose other end others may look at.
@@ -66,7 +68,7 @@ type Answer = Result<Reply, LinkError>;
 /// The common ground of holder and viewers.
 #[derive(Default)]
 struct Hub {
-    heard: Mutex<Heard>,
+    received: Mutex<Received>,
     /// Requests that wait for the holder; each viewer has one at most.
     errands: Mutex<Vec<Errand>>,
     viewers: AtomicUsize,
@@ -97,19 +99,19 @@ impl<V: Clone> Known<V> {
     /// The value while it is fresh.
     ///
     /// # Errors
-    /// Nothing was heard yet, or nothing since [`FRESH`]: the age.
+    /// Nothing was received yet, or nothing since [`FRESH`]: the age.
     fn fresh(&self) -> Result<V, Option<Duration>> {
         match &self.0 {
-            Some((value, heard)) if heard.elapsed() <= FRESH => Ok(value.clone()),
-            Some((_, heard)) => Err(Some(heard.elapsed())),
+            Some((value, since)) if since.elapsed() <= FRESH => Ok(value.clone()),
+            Some((_, since)) => Err(Some(since.elapsed())),
             None => Err(None),
         }
     }
 }
 
-/// The machine's last answers, and who is told its notices.
+/// The machine's last answers, and who receives its notices.
 #[derive(Default)]
-struct Heard {
+struct Received {
     identity: Option<Identity>,
     status: Known<Status>,
     inputs: Known<Inputs>,
@@ -166,7 +168,7 @@ impl<T: Transport> Shared<T> {
         Ok(())
     }
 
-    fn hear(&mut self, message: Message) {
+    fn receive(&mut self, message: Message) {
         match message {
             Message::Response(response) => {
                 if let Some(viewer) = self.asked.remove(&response.id) {
@@ -174,10 +176,10 @@ impl<T: Transport> Shared<T> {
                     let _ = viewer.try_send(response.result.clone());
                 }
                 if let Ok(reply) = response.result {
-                    self.hub.hear(reply);
+                    self.hub.keep(reply);
                 }
             }
-            Message::Notice(notice) => self.hub.tell(&notice),
+            Message::Notice(notice) => self.hub.broadcast(&notice),
         }
     }
 }
@@ -199,7 +201,7 @@ impl<T: Transport> Transport for Shared<T> {
                 if let Some(payload) = self.receiver.push(byte)
                     && let Ok(message) = frame::decode::<Message>(payload)
                 {
-                    self.hear(message);
+                    self.receive(message);
                 }
             }
             if count > 0 || self.inner.now() >= due {
@@ -231,8 +233,8 @@ impl<T: Transport> Transport for Shared<T> {
 
 impl Hub {
     /// The answers kept so far, also after a viewer that panicked: nothing is half written.
-    fn heard(&self) -> MutexGuard<'_, Heard> {
-        self.heard.lock().unwrap_or_else(PoisonError::into_inner)
+    fn received(&self) -> MutexGuard<'_, Received> {
+        self.received.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn errands(&self) -> MutexGuard<'_, Vec<Errand>> {
@@ -243,20 +245,20 @@ impl Hub {
         std::mem::take(&mut self.errands())
     }
 
-    fn hear(&self, reply: Reply) {
-        let mut heard = self.heard();
+    fn keep(&self, reply: Reply) {
+        let mut received = self.received();
         match reply {
-            Reply::Identity(identity) => heard.identity = Some(identity),
-            Reply::Status(status) => heard.status.set(status),
-            Reply::Inputs(inputs) => heard.inputs.set(inputs),
-            Reply::Learning(learning) => heard.learning.set(learning),
-            Reply::Fault(fault) => heard.fault.set(fault),
+            Reply::Identity(identity) => received.identity = Some(identity),
+            Reply::Status(status) => received.status.set(status),
+            Reply::Inputs(inputs) => received.inputs.set(inputs),
+            Reply::Learning(learning) => received.learning.set(learning),
+            Reply::Fault(fault) => received.fault.set(fault),
             _ => {}
         }
     }
 
-    fn tell(&self, notice: &Notice) {
-        for viewer in self.heard().viewers.values() {
+    fn broadcast(&self, notice: &Notice) {
+        for viewer in self.received().viewers.values() {
             // One that is slow misses it.
             let _ = viewer.try_send(notice.clone());
         }
@@ -267,16 +269,16 @@ impl Hub {
         if matches!(body, Body::Stop | Body::Disable) {
             return self.pass_on(viewer, body);
         }
-        let heard = self.heard();
+        let received = self.received();
         let known = match body {
-            Body::Hello => match heard.identity.clone() {
+            Body::Hello => match received.identity.clone() {
                 Some(identity) => Ok(Reply::Identity(identity)),
                 None => Err(None),
             },
-            Body::Status => heard.status.fresh().map(Reply::Status),
-            Body::Inputs => heard.inputs.fresh().map(Reply::Inputs),
-            Body::Learning => heard.learning.fresh().map(Reply::Learning),
-            Body::Fault => heard.fault.fresh().map(Reply::Fault),
+            Body::Status => received.status.fresh().map(Reply::Status),
+            Body::Inputs => received.inputs.fresh().map(Reply::Inputs),
+            Body::Learning => received.learning.fresh().map(Reply::Learning),
+            Body::Fault => received.fault.fresh().map(Reply::Fault),
             _ => {
                 return Err(LinkError::Refused(text(format_args!(
                     "another program holds the machine: this one may look, stop and disable"
@@ -285,12 +287,12 @@ impl Hub {
         };
         known.map_err(|age| match age {
             Some(age) => LinkError::Busy(text(format_args!(
-                "the program that holds the machine heard this {:.1} s ago, and nothing since{}",
+                "the program that holds the machine received this {:.1} s ago, and nothing since{}",
                 age.as_secs_f64(),
-                heard.last()
+                received.last()
             ))),
             None => LinkError::Busy(text(format_args!(
-                "the machine has not told its holder yet; ask again"
+                "the machine has not reported to its holder yet; ask again"
             ))),
         })
     }
@@ -320,7 +322,7 @@ impl Hub {
     }
 }
 
-impl Heard {
+impl Received {
     /// The last state, in words.
     fn last(&self) -> String {
         let Some((status, _)) = &self.status.0 else {
@@ -384,7 +386,7 @@ struct Viewer {
 
 impl Drop for Viewer {
     fn drop(&mut self) {
-        self.hub.heard().viewers.remove(&self.number);
+        self.hub.received().viewers.remove(&self.number);
         self.hub.viewers.fetch_sub(1, Ordering::Relaxed);
     }
 }
@@ -402,18 +404,18 @@ impl Viewer {
         };
         let mut notices = None;
         let mut server = LinkServer::new();
-        let mut heard = began;
+        let mut last = began;
         let mut buffer = [0; FRAME_BYTES];
         loop {
             if let Some(notices) = &notices {
-                tell(notices, &mut stream)?;
+                send(notices, &mut stream)?;
             }
             let most = if server.is_greeted() {
                 SILENCE
             } else {
                 GREETING
             };
-            if heard.elapsed() > most {
+            if last.elapsed() > most {
                 return Ok(());
             }
             let read = stream.read(&mut buffer);
@@ -431,7 +433,7 @@ impl Viewer {
                         return Ok(());
                     }
                     // Whole requests alone count: a stream of anything else is silence.
-                    heard = Instant::now();
+                    last = Instant::now();
                 }
             }
             if notices.is_none() && server.is_greeted() {
@@ -442,7 +444,7 @@ impl Viewer {
 
     fn subscribe(&self) -> Receiver<Notice> {
         let (sender, notices) = mpsc::sync_channel(WAITING);
-        self.hub.heard().viewers.insert(self.number, sender);
+        self.hub.received().viewers.insert(self.number, sender);
         notices
     }
 }
@@ -478,7 +480,7 @@ fn is_same(given: &[u8], token: &[u8]) -> bool {
 }
 
 /// Sends the notices that have come.
-fn tell(notices: &Receiver<Notice>, stream: &mut TcpStream) -> io::Result<()> {
+fn send(notices: &Receiver<Notice>, stream: &mut TcpStream) -> io::Result<()> {
     for notice in notices.try_iter() {
         stream.write_all(&encoded(&Message::Notice(notice)))?;
     }

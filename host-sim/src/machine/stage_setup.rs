@@ -44,7 +44,7 @@ impl StageSetup {
         Self::fresh(StageParameters::real(), [MarkParameters::default(); 3])
     }
 
-    /// A stage of one's own under a firmware that nobody has commissioned, and that a person has told what data sheets say: limits,
+    /// A stage of one's own under a firmware that nobody has commissioned, and whose settings have what data sheets say: limits,
     /// travel, and where the home switch is.
     pub fn of(file: &StageFile) -> Self {
         let mut setup = Self::fresh(file.truth.clone(), file.marks);
@@ -109,15 +109,17 @@ fn equip(truth: &mut AxisParameters, marks: &mut MarkParameters, settings: &Axis
     truth.full_scale_v = settings.amplifier.full_scale_v;
 }
 
-/// Velocities of homing, mm/s.
+/// Velocity of the search for the home switch, mm/s.
 const SEARCH_MM_S: f64 = 20.0;
+/// Velocity of its second, exact approach, mm/s.
 const LATCH_MM_S: f64 = 2.0;
 /// Time by which an axis lags behind its reference at most, s: that of the simulated stage's settings.
 const LAG_S: f64 = 2e-3;
 /// Largest deceleration of a stop, mm/s²: the settings' bound.
 const MOST_BRAKING_MM_S2: f64 = 3e4;
-/// Largest tracking error at any speed, mm, and counts.
+/// Largest tracking error at any speed, mm.
 const MOST_ERROR_MM: f64 = 20.0;
+/// Largest tracking error at any speed, counts.
 const MOST_ERROR_COUNTS: f64 = 8e6;
 
 /// Enters what a data sheet says.

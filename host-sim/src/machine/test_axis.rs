@@ -78,11 +78,11 @@ pub trait TestAxis {
     /// Settings that are refused, here or by the machine, or a connection that is broken; the old ones stay in force.
     fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError>;
 
-    /// Runs an experiment from where the axis stands, and records it. `progress` is told the share that is done,
+    /// Runs an experiment from where the axis stands, and records it. `progress` receives the share that is done,
     /// 0 to 1, a few times a second.
     ///
     /// # Errors
-    /// Whatever stopped the experiment; the outputs are off then.
+    /// The error that stopped the experiment; the outputs are off then.
     fn perform(
         &mut self,
         experiment: &Experiment,
@@ -96,14 +96,17 @@ pub trait TestAxis {
     }
 }
 
-/// Share of the travel that motions use: on a short one the tracking error takes a larger part.
+/// Share of the travel that motions use.
 const USED: f64 = 0.9;
+/// The same on a short travel, where the tracking error takes a larger part.
 const USED_OF_SHORT: f64 = 0.7;
+/// Travel either way below which it is short, mm.
 const SHORT_MM: f64 = 200.0;
 /// Share of the room in a direction after which an axis in open loop is stopped: it coasts on by as much again, and more.
 const OPEN_LOOP: f64 = 0.4;
-/// The same towards an end that is nearer than this share of the travel: what it coasts does not shrink with the room.
+/// The same towards an end that is nearer than [`NEAR_END`]: what it coasts does not shrink with the room.
 const OPEN_LOOP_NEAR: f64 = 0.2;
+/// Distance of this end over the travel.
 const NEAR_END: f64 = 0.52;
 
 /// Returns the travel that planned motions use of a travel either way, mm.
@@ -154,7 +157,7 @@ pub fn span_mm(motion: &MotionSettings) -> Option<Range<f64>> {
     match motion {
         MotionSettings::Hold => Some(0.0..0.0),
         MotionSettings::PointToPoint(to) => Some(to.distance_mm.min(0.0)..to.distance_mm.max(0.0)),
-        // Whatever its phase.
+        // With any phase.
         MotionSettings::Harmonic(sine) if sine.phase_rad == 0.0 => {
             Some(-sine.amplitude_mm..sine.amplitude_mm)
         }

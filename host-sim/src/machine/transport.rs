@@ -32,7 +32,7 @@ pub trait Transport {
     /// Returns the remedy if the other end is silent.
     fn remedy(&self) -> &'static str;
 
-    /// True if others look at the machine, and are told what this end hears.
+    /// True if others look at the machine, and receive what this end receives.
     fn is_shared(&self) -> bool {
         false
     }

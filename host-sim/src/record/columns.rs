@@ -413,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_of_more_than_memory_bears_are_refused_while_they_are_read() {
+    fn rows_of_more_than_memory_allows_are_refused_while_they_are_read() {
         // What comes after the last row that is allowed is not looked at.
         let rows = "0,1\n".repeat(20) + "nonsense,\n";
         let text = format!("t_s,reference_mm\n{rows}");

@@ -97,7 +97,7 @@ pub enum RecordError {
         /// Rows after the header.
         rows: usize,
     },
-    /// More than memory is meant to bear.
+    /// More than the memory that may be used.
     #[error("{}: more than {most_rows} rows of data; split the recording, or keep every tenth row of a slow one", path.display())]
     TooManyRows {
         /// Path of the file.

@@ -17,8 +17,9 @@ const MOST_VOLTS: f64 = 20.0;
 const LEAST_VOLTS: f64 = 0.01;
 /// Longest travel of a machine's axis, mm.
 const MOST_TRAVEL_MM: f64 = 1e4;
-/// The usual limit of an amplifier's input, V, and the share of rows that may lie there.
+/// Usual limit of an amplifier's input, V.
 const LIMIT_V: f64 = 10.0;
+/// Largest share of rows that may lie there.
 const MOST_SATURATED: f64 = 0.01;
 
 /// The signals of one experiment on one axis, sampled evenly. All columns have one length.
@@ -48,7 +49,7 @@ pub struct MotionOptions {
     pub resample: bool,
 }
 
-/// The units that columns are in, as far as their ranges tell.
+/// The units that columns are in, as far as their ranges show.
 #[derive(Clone, Copy)]
 struct Believed {
     /// Positions are lengths.
@@ -179,7 +180,7 @@ impl Recording {
         Self::read_csv_with(path, &mut |_| {})
     }
 
-    /// As [`read_csv`](Self::read_csv), for long files: `progress` is told the share that is read, 0 to 1.
+    /// As [`read_csv`](Self::read_csv), for long files: `progress` receives the share that is read, 0 to 1.
     ///
     /// # Errors
     /// As [`read_csv`](Self::read_csv).
@@ -333,7 +334,7 @@ fn resample_by(grid: &Grid, columns: &mut Columns) {
     }
 }
 
-/// Refuses a position that no axis reaches, whatever the reference says.
+/// Refuses a position that no axis reaches, even if the reference has it.
 fn check_travel(path: &Path, column: &'static str, travel_mm: f64) -> Result<(), RecordError> {
     if travel_mm <= MOST_TRAVEL_MM {
         return Ok(());

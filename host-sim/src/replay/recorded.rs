@@ -181,7 +181,7 @@ pub fn emps_axis() -> Result<Axis, ReplayError> {
     settings.friction = with_all_models(friction, gms.clone());
     settings.feedforward.gains.inertia_v_s2_per_mm = 1.0 / gain;
     settings.feedforward.preview_s = emps::DELAY_S;
-    // The published offset is a constant force that the controller must hold against.
+    // The published offset is a constant force that the controller must hold.
     settings.amplifier.offset_v = emps::OFFSET_N * per_newton;
     settings.plant = Some(plant);
     settings.limits.max_acceleration_mm_s2 = 5000.0;
@@ -261,7 +261,7 @@ impl From<quadrant_settings::SettingsError> for ReplayError {
     }
 }
 
-/// Makes the motion along recorded positions, mm. Its table lives in flash for ever in a firmware; here it lives as long as the
+/// Makes the motion along recorded positions, mm. Its table stays in flash in a firmware; here it lives as long as the
 /// process.
 ///
 /// # Errors

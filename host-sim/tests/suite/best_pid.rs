@@ -9,8 +9,9 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 
-/// Evaluations of each of the other's runs, and its runs.
+/// Evaluations in each run of the other search.
 const EVALUATIONS: usize = 700;
+/// Runs of the other search.
 const RUNS: u64 = 3;
 /// Share by which the other may find less error.
 const WORSE: f64 = 0.01;

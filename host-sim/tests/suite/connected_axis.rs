@@ -67,7 +67,7 @@ fn values(sequence: u32, words: &[i16], last: bool) -> InjectRequest {
     }
 }
 
-/// The status once the machine has done what it was told.
+/// The status once the machine has carried out its command.
 fn later(client: &mut Client) -> Status {
     client.wait(Duration::from_millis(400)).unwrap();
     client.status().unwrap()

@@ -1,4 +1,4 @@
-//! The experiments on the simulated stage: what they must show whatever the exact figures are.
+//! The experiments on the simulated stage: what they must show, apart from exact figures.
 
 use quadrant_law::command::Command;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};

@@ -1,4 +1,4 @@
-//! The reference under whatever a host asks for: in no tick does it go faster than the settings allow, in any order of
+//! The reference under any request of a host: in no tick does it go faster than the settings allow, in any order of
 //! streams, moves, plans, jogs and stops.
 
 use quadrant::app::Translated;
@@ -92,7 +92,7 @@ impl Host {
         }
     }
 
-    /// Compares the references with those of the tick before, unless homing or enabling began them anew, or a full line
+    /// Compares the references with those of the tick before, unless homing or enabling restarted them, or a full line
     /// let ticks pass.
     fn look(&mut self) {
         let state = self.bench.running.state();

@@ -74,7 +74,7 @@ struct Tally {
     ticks: u64,
     /// Frames that the machine sent.
     answered: u64,
-    heard: u64,
+    received: u64,
     restarts: u64,
     enabled_ticks: u64,
     moving_ticks: u64,
@@ -87,7 +87,7 @@ pub(crate) struct Bench {
     plant: SimulatedStage,
     pub(crate) settings: StageSettings,
     line: Line,
-    /// Hears what a port hears.
+    /// Receives what a port receives.
     ear: LinkServer,
     asked_to_enable: bool,
     asked_to_move: bool,
@@ -144,13 +144,13 @@ impl Bench {
     /// Sends bytes, and runs the machine until it has read most of what was sent.
     pub(crate) fn send(&mut self, bytes: &[u8]) {
         for byte in bytes {
-            let (enable, motion, heard) = (
+            let (enable, motion, received) = (
                 &mut self.asked_to_enable,
                 &mut self.asked_to_move,
-                &mut self.tally.heard,
+                &mut self.tally.received,
             );
             self.ear.push(*byte, |body| -> Result<Reply, LinkError> {
-                *heard += 1;
+                *received += 1;
                 *enable |= body == Body::Enable;
                 *motion |= starts_a_motion(&body);
                 Ok(Reply::Done)
@@ -374,7 +374,7 @@ fn check(seed: u64, frames: u64) {
             (0, 0),
             "{tally:?}"
         );
-        assert!(tally.heard > frames / 12, "{tally:?}");
+        assert!(tally.received > frames / 12, "{tally:?}");
         assert!(tally.answered > frames / 12, "{tally:?}");
         match allowed {
             Allowed::Looking => assert_eq!((tally.enabled_ticks, tally.moving_ticks), (0, 0)),

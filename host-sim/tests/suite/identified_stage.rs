@@ -53,8 +53,8 @@ fn performance(stage: &StageSettings) -> [f64; 3] {
     ]
 }
 
-/// The committed settings, but the feedforward of x told the truth, on the given elements.
-fn truth_told(elements: &GmsParameters) -> StageSettings {
+/// The committed settings, but with the stage's true friction in the feedforward of x, on the given elements.
+fn with_true_friction(elements: &GmsParameters) -> StageSettings {
     let mut stage = identified_settings().unwrap().stage;
     let [truth, _, _] = StageParameters::real().axes;
     let axis = &mut stage.axes[0];
@@ -116,12 +116,12 @@ fn truth_on_the_same_knots() -> GmsParameters {
 #[test]
 fn identified_settings_do_as_well_as_the_truth_on_as_many_elements() {
     let identified = performance(&identified_settings().unwrap().stage);
-    let told = performance(&truth_told(&truth_on_the_same_knots()));
-    println!("identified {identified:?}, told the truth {told:?}");
-    // Told the truth on its own ten elements, the axis does better where a single instant counts.
+    let exact = performance(&with_true_friction(&truth_on_the_same_knots()));
+    println!("identified {identified:?}, true friction {exact:?}");
+    // With its true friction on its own ten elements, the axis does better where a single instant counts.
     let [truth, _, _] = StageParameters::real().axes;
-    let ten = performance(&truth_told(&truth.gms));
-    for exact in [told, ten] {
+    let ten = performance(&with_true_friction(&truth.gms));
+    for exact in [exact, ten] {
         let [largest, rms, glitch] = [0, 1, 2].map(|score| identified[score] / exact[score]);
         assert!(
             largest < 1.4 && rms < 1.1 && glitch < 1.6,

@@ -40,7 +40,7 @@ fn slow_rig(truth: &AxisParameters, seed: u64) -> SimulatedTestAxis {
     test_axis
 }
 
-/// The default measurement with an excitation that leaves every pass sliding, whatever its phases.
+/// The default measurement with an excitation that leaves every pass sliding, for all phases.
 fn gentle() -> FrfSettings {
     let mut settings = FrfSettings::default();
     settings.excitation.rms_v = 0.08;

@@ -13,8 +13,9 @@ use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_sim::record::{MotionOptions, Recording};
 
-/// Of the EMPS drive (see the record's own description).
+/// Force constant of the EMPS drive, N/V (see the record's own description).
 const FORCE_N_PER_V: f64 = 35.150_651_882_485_47;
+/// Control loop of the EMPS drive.
 const EMPS_LOOP: CascadeLoop = CascadeLoop {
     position_gain_per_s: 160.18,
     velocity_gain_v_s_per_mm: 0.243_45,
@@ -96,7 +97,7 @@ fn the_record_of_emps_repeats_itself_and_is_not_judged_by_its_repetitions() {
     let Some((_, candidates)) = emps_models() else {
         return;
     };
-    // The same trajectory four times: whoever withholds one of them judges what was fitted.
+    // The same trajectory four times: a fit without one of them is judged by its own data.
     for candidate in candidates {
         let ratio = validation(candidate) / candidate.model.relative_error;
         assert!((1.04..1.3).contains(&ratio), "{ratio}");
@@ -191,7 +192,7 @@ fn with_the_dead_time_known_the_simulated_axes_are_found() {
 }
 
 #[test]
-fn without_it_inertia_and_dead_time_are_hardly_told_apart_but_their_sum_is() {
+fn without_it_inertia_and_dead_time_are_hardly_separated_but_their_sum_is_known() {
     let truth = &StageParameters::real().axes[0];
     let candidates = fitted(&simulated(0, truth), &MotionFitSettings::default());
     let model = &recommended(&candidates).unwrap().model;
@@ -293,7 +294,7 @@ fn the_record_that_judges_and_not_that_of_the_fit_decides_which_model_is_recomme
     };
     let (_, best, of_own) = by(&fit);
     assert!(
-        best <= NEARLY * of_own + NEARLY_OF_VOLTAGE,
+        best <= EQUAL_ERROR_RATIO * of_own + EQUAL_ERROR_SHARE,
         "{best} {of_own}"
     );
     let mut smooth = truth.clone();
@@ -307,17 +308,18 @@ fn the_record_that_judges_and_not_that_of_the_fit_decides_which_model_is_recomme
     let (_, best, of_own) = by(&other);
     println!("error on the other record: {best:.4}, of the fit's own choice {of_own:.4}");
     assert!(
-        best <= NEARLY * of_own + NEARLY_OF_VOLTAGE,
+        best <= EQUAL_ERROR_RATIO * of_own + EQUAL_ERROR_SHARE,
         "{best} {of_own}"
     );
 }
 
-/// Errors over the smallest up to which a simpler model is recommended, and shares of the voltage.
-const NEARLY: f64 = 1.02;
-const NEARLY_OF_VOLTAGE: f64 = 0.0015;
+/// Largest error over the smallest up to which a simpler model is recommended.
+const EQUAL_ERROR_RATIO: f64 = 1.02;
+/// The same as a share of the voltage.
+const EQUAL_ERROR_SHARE: f64 = 0.0015;
 
 #[test]
-fn records_that_tell_too_little_are_refused_with_what_they_lack() {
+fn records_that_determine_too_little_are_refused_with_what_they_lack() {
     let truth = &StageParameters::real().axes[0];
     let whole = simulated(0, truth);
     let settings = MotionFitSettings::default();
@@ -377,8 +379,8 @@ fn simulated_record(coulomb_v: f64, mut step_s: impl FnMut(usize) -> f64) -> Vec
     while time < 8.0 {
         let measured = (position * 1e3_f64).round() / 1e3;
         let ahead = (reference(time + 1e-4) - reference(time - 1e-4)) / 2e-4;
-        let wanted = 2.0 * (reference(time) - measured) + 0.012 * (ahead - velocity);
-        let voltage = (wanted + 2e-3 * ahead).clamp(-10.0, 10.0);
+        let commanded = 2.0 * (reference(time) - measured) + 0.012 * (ahead - velocity);
+        let voltage = (commanded + 2e-3 * ahead).clamp(-10.0, 10.0);
         rows.push([time, measured, voltage]);
         let step = step_s(rows.len());
         for _ in 0..40 {

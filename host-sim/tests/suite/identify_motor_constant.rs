@@ -29,7 +29,7 @@ fn every_axis_shows_its_acceleration_per_volt() {
         for seed in 1..=3 {
             let found = test_of(truth, index, seed);
             let error = found.gain_mm_per_v_s2 / truth.gain_mm_per_v_s2 - 1.0;
-            // The ripple of the screw makes it low; a first controller bears a factor of two.
+            // The ripple of the screw makes it low; a first controller allows a factor of two.
             assert!(error.abs() < 0.1, "axis {index}, seed {seed}: {error}");
         }
     }
@@ -148,7 +148,7 @@ fn a_motor_on_a_soft_spring_is_pushed_gently_until_its_table_slides() {
 }
 
 #[test]
-fn the_noise_of_the_encoder_is_told_from_a_motor_that_swings_on_its_spring() {
+fn the_noise_of_the_encoder_is_distinguished_from_a_motor_that_swings_on_its_spring() {
     let mut truth = on_a_soft_spring(60.0);
     for noise_mm in [3e-4, 1e-3, 3e-3] {
         truth.imperfections.encoder_noise_mm = noise_mm;

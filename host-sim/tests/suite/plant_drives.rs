@@ -28,7 +28,7 @@ fn cogging_holds_an_unpowered_table_at_a_pole_and_does_no_net_work() {
         .sum();
     assert!(work.abs() < 1e-12);
     assert!(cogging.force_v(0.1) < 0.0 && cogging.force_v(-0.1) > 0.0);
-    // Pushed with less than cogging and friction bear, it stays within half a pole.
+    // Pushed with less than cogging and friction hold, it stays within half a pole.
     let mut axis = SimulatedAxis::new(truth, RATE_HZ, 1);
     axis.set_load_v(0.035);
     for _ in 0..50_000 {

@@ -1,8 +1,8 @@
 //! The triggered capture: a ring of samples at up to the full control rate, with what came before the trigger.
 //!
-//! The slow half arms a [`Capture`] and hands it through a queue to the control interrupt, which steps it after every
-//! tick and hands it back frozen. Whoever holds it may touch it: nothing is shared and nothing locked. A
-//! fault triggers an armed capture whatever it waits for, so that every fault leaves its trace.
+//! The slow half arms a [`Capture`] and passes it through a queue to the control interrupt, which steps it after every
+//! tick and returns it frozen. Only its present owner may touch it: nothing is shared and nothing locked. A
+//! fault triggers an armed capture, whichever trigger it waits for, so that every fault leaves its trace.
 
 mod trigger;
 

@@ -119,7 +119,7 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     injection: Option<OpenInjection>,
     /// The lowest and the highest position of the plan's motions, mm from their start.
     plan_reach_mm: PerAxis<(f64, f64)>,
-    heard_tick: u32,
+    request_tick: u32,
     packer: Packer,
     generation: u8,
     recorder: Recorder<'a>,
@@ -142,7 +142,7 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     deferred: Option<Deferred>,
     /// Control keeps the outputs off for this server.
     locked: bool,
-    /// Valid settings were stored, which control has not been told yet.
+    /// Valid settings were stored, which control does not know yet.
     accepted: bool,
 }
 
@@ -174,7 +174,7 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
             stream: None,
             injection: None,
             plan_reach_mm: PerAxis::splat((0.0, 0.0)),
-            heard_tick: 0,
+            request_tick: 0,
             packer: Packer::default(),
             generation: 0,
             recorder: Recorder::new(parts.capture),
@@ -271,7 +271,7 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
             let Some(response) = response else {
                 continue;
             };
-            self.heard_tick = self.seen.tick;
+            self.request_tick = self.seen.tick;
             if let Some(deferred) = &mut self.deferred {
                 deferred.id = response.id;
                 return false;

@@ -98,7 +98,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         Ok(())
     }
 
-    /// Checks that the control law would take a command, as far as the last snapshot tells.
+    /// Checks that the control law would take a command, as far as the last snapshot shows.
     pub(super) fn check(&self, command: Command) -> Result<(), LinkError> {
         match admission::refusal_from(Station::Host, self.seen.view, command) {
             Some(reason) => Err(refused(format_args!("{reason}"))),
@@ -175,7 +175,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         self.defer(Work::Plan(reach_mm))
     }
 
-    /// Lays motions that keep to their axes' limits where control takes them from when it is ordered to.
+    /// Plans motions that keep to their axes' limits where control takes them from when it is ordered to.
     #[inline(never)]
     fn hand_over(&mut self, plan: &PlanSettings) -> Result<(), LinkError> {
         let settings = self.in_force()?;

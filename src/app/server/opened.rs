@@ -9,7 +9,7 @@ pub(super) struct OpenStream {
     pub(super) planner: StreamPlanner,
     /// The host's number of the set point that is expected next.
     pub(super) next: u32,
-    /// The axes have been told to start.
+    /// The axes have received the order to start.
     pub(super) started: bool,
     /// The last set point has come.
     pub(super) complete: bool,
@@ -24,7 +24,7 @@ pub(super) struct OpenInjection {
     pub(super) next: u32,
     /// The last value has come.
     pub(super) complete: bool,
-    /// The tick at which the control law was told to begin.
+    /// The tick at which the control law was ordered to begin.
     pub(super) started: Option<u32>,
     pub(super) progress: Option<InjectionProgress>,
     pub(super) ended: bool,

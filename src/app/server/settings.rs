@@ -65,11 +65,11 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
 
     /// A page of the draft's paths that are asked for.
     #[inline(never)]
-    fn list(&self, cursor: u16, wanted: impl Fn(&str) -> bool) -> Result<Reply, LinkError> {
+    fn list(&self, cursor: u16, is_listed: impl Fn(&str) -> bool) -> Result<Reply, LinkError> {
         let mut page = PathPage::default();
         let mut number = 0;
         let visited = self.draft.settings().list("", &mut |path| {
-            if !wanted(path) {
+            if !is_listed(path) {
                 return;
             }
             if number >= usize::from(cursor) {
@@ -144,7 +144,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         )))
     }
 
-    /// Builds the next axis whose settings have changed into the back buffer, and hands it over.
+    /// Builds the next axis whose settings have changed into the back buffer, and passes it to control.
     pub(super) fn build_pending(&mut self) {
         if self.back_buffer.is_none() {
             self.back_buffer = self.ends.back_buffers.dequeue();

@@ -10,7 +10,7 @@ pub struct ServerStatistics {
     /// True if a host has said hello.
     pub greeted: bool,
     /// The tick of the last request.
-    pub heard_tick: u32,
+    pub request_tick: u32,
     /// Frames that were damaged, too long, or no message.
     pub bad_frames: u32,
     /// Samples of the present selection of telemetry that found no room.
@@ -31,7 +31,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         let frames = self.link.counters();
         ServerStatistics {
             greeted: self.link.is_greeted(),
-            heard_tick: self.heard_tick,
+            request_tick: self.request_tick,
             bad_frames: frames
                 .damaged
                 .wrapping_add(frames.overlong)

@@ -149,7 +149,8 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         let Some(stream) = &self.stream else {
             return;
         };
-        let ended = stream.started && waiting == 0 && !running && self.seen.tick != self.heard_tick;
+        let ended =
+            stream.started && waiting == 0 && !running && self.seen.tick != self.request_tick;
         if !enabled || ended {
             self.stream = None;
         } else if !stream.started

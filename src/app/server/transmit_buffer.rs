@@ -34,7 +34,7 @@ impl TransmitBuffer {
     /// Replaces a frame that has been sent by that of a message.
     pub(super) fn fill(&mut self, message: &impl Serialize) {
         self.sent = 0;
-        // Every message fits: their types bound them, and a test holds the largest against a frame.
+        // Every message fits: their types bound them, and a test compares the largest with a frame.
         self.length = frame::encode(message, &mut self.frame).map_or(0, <[u8]>::len);
     }
 }

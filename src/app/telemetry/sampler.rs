@@ -5,11 +5,11 @@ use quadrant_link::message::MAX_CHANNELS;
 use super::{Observation, Selection};
 use quadrant_law::scalar::Scalar;
 
-/// The selection to sample. The slow half makes it and hands it over whole.
+/// The selection to sample. The slow half builds it and passes it on whole.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sampler {
     selection: Option<Selection>,
-    /// Tells samples of this selection from those of the one before.
+    /// Distinguishes samples of this selection from those of the one before.
     generation: u8,
 }
 

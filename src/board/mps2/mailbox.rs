@@ -34,7 +34,7 @@ pub(super) fn write(offset: usize, word: u32) {
     unsafe { core::ptr::write_volatile((BASE + offset) as *mut u32, word) }
 }
 
-/// True if the outputs that the host was told last are enabled.
+/// True if the last outputs reported to the host are enabled.
 pub(super) fn is_enabled() -> bool {
     read(OUTPUT + 4) >> 16 & 1 == 1
 }

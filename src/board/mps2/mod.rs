@@ -76,7 +76,7 @@ pub(crate) const RATES_HZ: (f64, f64) = (1e3, 1e5);
 /// The board's name.
 pub(crate) const NAME: &str = "mps2";
 
-/// Ends the emulator; the host starts it afresh. The answer to whoever asked for it is on its way by then.
+/// Ends the emulator; the host starts it again. The answer to the request is on its way by then.
 pub(crate) fn restart() -> ! {
     serial::exchange();
     halt(Outcome::Done)
@@ -141,7 +141,7 @@ fn input(word: usize) -> usize {
     INPUTS.load(Ordering::Relaxed) as usize + 4 * word
 }
 
-/// The index of this tick's record, which stays inside the memory whatever happens.
+/// The index of this tick's record, which stays inside the memory in every case.
 #[inline(always)]
 fn record() -> usize {
     TICKS
@@ -169,7 +169,7 @@ impl hal::Encoders for Encoders {
 }
 
 impl Encoders {
-    /// Takes over what the flags say, and is as slow as they say.
+    /// Adopts what the flags say, and is as slow as they say.
     #[cold]
     #[inline(never)]
     fn read_flags(&self, readings: &mut [EncoderReading; 3]) {
@@ -212,7 +212,7 @@ pub(crate) struct Amplifiers {
 }
 
 impl hal::Amplifiers for Amplifiers {
-    /// Hands to the host what the converters hold of this tick's codes.
+    /// Passes to the host what the converters hold of this tick's codes.
     #[inline(always)]
     fn write(&mut self, outputs: &Outputs) {
         let codes = outputs.codes.into_array();

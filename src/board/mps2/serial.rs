@@ -1,6 +1,6 @@
 //! The link's port: two rings in the memory shared with the host.
 //!
-//! Host and firmware run at their own pace, but a session is to be the same every time. So bytes change hands only when
+//! Host and firmware run at their own pace, but a session is to be the same every time. So bytes are exchanged only when
 //! a tick's inputs are taken ([`exchange`]): what the host has written by then can be read in this tick, and what the
 //! firmware has written by then is shown to the host with this tick's outputs.
 
@@ -23,7 +23,7 @@ static WRITTEN: AtomicU32 = AtomicU32::new(0);
 /// Bytes that the host has read.
 static GONE: AtomicU32 = AtomicU32::new(0);
 
-/// Lets bytes change hands. Not while the port is in use: the idle loop calls it, and whoever ends the emulator.
+/// Exchanges bytes. Not while the port is in use: the idle loop calls it, and the code that ends the emulator.
 pub(super) fn exchange() {
     ARRIVED.store(mailbox::read(LINK_IN_WRITTEN), Ordering::Relaxed);
     GONE.store(mailbox::read(LINK_OUT_TAKEN), Ordering::Relaxed);

@@ -62,7 +62,7 @@ impl Timer {
         self.read(Self::INTERRUPT) & 1 != 0
     }
 
-    /// Waits for the next reload, but not for ever.
+    /// Waits for the next reload, with a limit.
     #[cold]
     #[inline(never)]
     pub(super) fn wait_until_due(self) {

@@ -59,7 +59,7 @@ impl hal::Watchdog for Watchdog {
 }
 
 // The machine has no register that says why it was reset; this is the last moment to write it down. The firmware is not
-// told: it hangs on until the second zero.
+// informed: it hangs on until the second zero.
 //
 // SAFETY: it writes one word of the shared memory that no Rust object occupies, and assumes nothing of what it interrupts.
 #[exception]

@@ -154,7 +154,7 @@ impl DelayNs for CoreDelay {
 
 /// Zero volts, amplifiers disabled, brake applied, from any context: also from a panic before or in the middle of anything.
 pub(crate) fn outputs_off() {
-    // SAFETY: whoever owns these peripherals is not coming back: this runs with interrupts disabled on the way to
+    // SAFETY: the owner of these peripherals does not run again: this runs with interrupts disabled on the way to
     // `halt`. Only single register writes are made, each valid in any state the owner left.
     let (port_b, port_c, bus, timer, dma) = unsafe {
         (
@@ -195,7 +195,7 @@ pub(crate) fn outputs_off() {
     port_b.bsrr().write(|w| w.bs(LOAD).set_bit());
 }
 
-/// Waits for the bus, but not for ever: a bus that was never started does not get ready.
+/// Waits for the bus, with a limit: a bus that was never started does not get ready.
 fn wait_for(ready: impl Fn() -> bool) {
     for _ in 0..PATIENCE {
         if ready() {

@@ -5,7 +5,7 @@ use quadrant::drivers::ad5754r::steps::Hardware;
 /// Clock of timer 1: the processor's, as APB 2 runs at half of it.
 pub(crate) const TIMER_HZ: u32 = 180_000_000;
 
-/// The bus while the converter listens, at up to 30 MHz: 45 MHz divided by two.
+/// The bus while the converter receives, at up to 30 MHz: 45 MHz divided by two.
 pub(crate) const WRITING: Hardware = hardware(2);
 /// The bus while the converter answers: 45 MHz divided by eight. A quarter would leave 44 ns from edge to edge, of which SDO may
 /// take 40 ns and the processor's input needs some.

@@ -60,7 +60,7 @@ unsafe impl<T, const N: usize> Sync for Shared<T, N> {}
 
 /// Words for the set/reset register of port B, in RAM: flash cannot be read while it is erased.
 static PIN_WORDS: Shared<u32, MAX_STEPS> = Shared(UnsafeCell::new([0; MAX_STEPS]));
-/// Bytes to send, zero where the chip does not hear them.
+/// Bytes to send, zero where the chip does not receive them.
 static TO_SEND: Shared<u8, MAX_STEPS> = Shared(UnsafeCell::new([0; MAX_STEPS]));
 static RECEIVED: Shared<u8, MAX_STEPS> = Shared(UnsafeCell::new([0; MAX_STEPS]));
 
@@ -78,7 +78,7 @@ impl<T: Copy, const N: usize> Shared<T, N> {
     #[inline(always)]
     fn write<const COUNT: usize>(&self, first: usize, items: [T; COUNT]) {
         for (index, item) in (first..).zip(items) {
-            // SAFETY: one of the items, which live for ever.
+            // SAFETY: one of the items, which are static.
             unsafe { self.place(index).write_volatile(item) };
         }
     }
@@ -166,7 +166,7 @@ impl ConverterBus {
                 RECEIVER_CR,
             ),
         ] {
-            // SAFETY: the addresses are those of registers and of memory that lives for ever; the configuration is the manual's.
+            // SAFETY: the addresses are those of registers and of static memory; the configuration is the manual's.
             unsafe {
                 stream.par().write(|w| w.pa().bits(peripheral));
                 stream.m0ar().write(|w| w.m0a().bits(memory));
@@ -273,7 +273,7 @@ impl Sequencer for ConverterBus {
         // What was received is read after the counter.
         fence(Ordering::Acquire);
         Ok([0, 1, 2].map(|index| {
-            // SAFETY: one of the items, which live for ever.
+            // SAFETY: one of the items, which are static.
             unsafe { RECEIVED.place(index).read_volatile() }
         }))
     }

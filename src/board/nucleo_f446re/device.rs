@@ -1,6 +1,6 @@
 //! Description of the chip for RTIC, with the interrupts we use named by role.
 //!
-//! The vector table itself is the chip crate's; `roles.x` tells the linker which entry plays which role.
+//! The vector table itself is the chip crate's; `roles.x` declares to the linker which entry plays which role.
 
 use stm32f4xx_hal::pac;
 

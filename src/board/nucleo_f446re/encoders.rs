@@ -5,7 +5,7 @@
 //! work as normal" in that mode. All nine inputs have the same digital filter, so that all edges are late by the same
 //! time and the index keeps its place among the counts.
 //!
-//! These timers do not tell when both lines change at once: a count that is lost or gained that way shows as a distance
+//! These timers do not report when both lines change at once: a count that is lost or gained that way shows as a distance
 //! between index pulses that is wrong.
 
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -82,7 +82,7 @@ macro_rules! start {
             $timer.smcr().write(|w| w.bits(COUNT_BOTH as _));
             $timer.arr().write(|w| w.bits($last.into()));
             $timer.cr1().write(|w| w.bits((ENABLE | $control) as _));
-            // Whatever the inputs did on their way here was no index.
+            // No event on the inputs before this point was an index.
             $timer.sr().write(|w| w.bits(0));
         }
     }};

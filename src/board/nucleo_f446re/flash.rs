@@ -20,9 +20,11 @@ use super::watchdog::KEY_RELOAD;
 
 /// Address of the two sectors; the linker's map leaves them out.
 const START: u32 = 0x0800_4000;
-/// Bytes of a sector, and the number of the first.
+/// Bytes of a sector.
 const SECTOR: u32 = 16 * 1024;
+/// Number of the first sector of the settings.
 const FIRST_SECTOR: u32 = 1;
+/// Number of these sectors.
 const SECTORS: u32 = 2;
 
 /// FLASH_KEYR (RM0390, 3.8.3).
@@ -46,7 +48,7 @@ const ERASE_LOOKS: u32 = 9_000_000;
 /// The same for a word: at least 1 ms, and the processor waits by itself, as it fetches from the same flash.
 const PROGRAM_LOOKS: u32 = 20_000;
 
-/// The flash did not do what it was told.
+/// The flash did not carry out its command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FlashError {
     /// Outside of the two sectors.
@@ -141,7 +143,7 @@ impl SettingsFlash {
         }
     }
 
-    /// Waits until the controller is idle, but not for ever.
+    /// Waits until the controller is idle, with a limit.
     fn wait(&self) {
         for _ in 0..PROGRAM_LOOKS {
             if self.flash.sr().read().bits() & BUSY == 0 {

@@ -1,5 +1,5 @@
 //! The fallback without an external converter: x and y on the chip's own two 12-bit converters, made better by shaping
-//! their error. **There is no third converter: z is not driven**, and whatever its codes are, nothing moves it.
+//! their error. **There is no third converter: z is not driven**, and its codes move nothing.
 //!
 //! `docs/outputs.md` says what this costs in tracking error, and the circuit that makes ±10 V of 0 to 3.3 V.
 
@@ -88,7 +88,7 @@ fn write_both(converter: &DAC, [x, y]: [i16; 2]) {
 
 /// Zero volts, amplifiers disabled, brake applied, from any context: also from a panic before or in the middle of anything.
 pub(crate) fn outputs_off() {
-    // SAFETY: whoever owns these peripherals is not coming back: this runs with interrupts disabled on the way to
+    // SAFETY: the owner of these peripherals does not run again: this runs with interrupts disabled on the way to
     // `halt`. Only single register writes are made, each valid in any state the owner left.
     let (port_b, port_c, converter) =
         unsafe { (pac::GPIOB::steal(), pac::GPIOC::steal(), DAC::steal()) };

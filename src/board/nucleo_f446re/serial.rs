@@ -22,6 +22,7 @@ const SENDING: usize = 512;
 /// Streams of DMA 1 (RM0390, table 28): USART2_RX is stream 5, USART2_TX is stream 6, both on channel 4.
 const RECEIVER: usize = 5;
 const SENDER: usize = 6;
+/// Channel of both streams.
 const CHANNEL: u8 = 4;
 /// USART_SR: all bits that a zero clears, but for that of a finished transmission.
 const CLEAR_SENT: u16 = !(1 << 6);
@@ -75,7 +76,7 @@ impl Serial {
         let data_register = usart.dr().as_ptr() as u32;
 
         let receiver = dma.st(RECEIVER);
-        // SAFETY: the addresses are those of the data register and of memory that lives for ever.
+        // SAFETY: the addresses are those of the data register and of static memory.
         unsafe {
             receiver.par().write(|w| w.pa().bits(data_register));
             receiver.m0ar().write(|w| w.m0a().bits(RECEIVED.address()));
@@ -109,7 +110,7 @@ impl hal::Serial for Serial {
         // What the counter says was written is read after the counter.
         fence(Ordering::Acquire);
         let byte = |index| {
-            // SAFETY: the index is one of the ring, which lives for ever; the stream writes it, hence volatile.
+            // SAFETY: the index is one of the ring, which is static; the stream writes it, hence volatile.
             unsafe { RECEIVED.byte(index).read_volatile() }
         };
         self.ring.read(remaining.into(), byte, into)

@@ -12,13 +12,15 @@ const FASTEST_COUNTS_PER_S: u32 = 1_000_000;
 pub(crate) const ENCODER_FILTER: InputFilter =
     InputFilter::strongest(90_000_000, 1, shortest_level_ns(FASTEST_COUNTS_PER_S));
 
-/// Port A: the emergency stop, and the amplifiers' ready line.
+/// Port A: the emergency stop.
 const EMERGENCY_STOP: u16 = 1 << 0;
+/// Port A: the amplifiers' ready line.
 const NOT_READY: u16 = 1 << 1;
 /// Port A: the first of three amplifier faults, x, y, z.
 const FIRST_FAULT: u32 = 8;
-/// Port C: the first of six limits, x- x+ y- y+ z- z+, and the first of three home switches.
+/// Port C: the first of six limits, x- x+ y- y+ z- z+.
 const FIRST_LIMIT: u32 = 0;
+/// Port C: the first of three home switches.
 const FIRST_HOME: u32 = 10;
 
 /// The pins of port A and of port C that are inputs of this kind; all have pull-ups.

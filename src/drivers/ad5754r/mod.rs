@@ -3,7 +3,7 @@
 //! Frames are 24 bits, most significant first: bit 23 asks for a read, bits 21..16 name register and channel, then come
 //! 16 bits of data. The chip reads SDIN at the falling edge of the clock (SPI mode 1), at up to 30 MHz. /SYNC frames one
 //! register; the new codes appear at the outputs together, at the falling edge of /LDAC. While /CLR is low all outputs
-//! are at zero volts, whatever the bus does. The pin BIN//2sCOMP must be tied low: codes are then two's complement, and
+//! are at zero volts, independent of the bus. The pin BIN//2sCOMP must be tied low: codes are then two's complement, and
 //! zero is zero volts.
 //!
 //! # Beside the computation
@@ -11,8 +11,8 @@
 //! sends them ([`steps`]). [`Ad5754r::begin`], at the beginning of the next tick, checks that all of it left.
 //!
 //! # Read-back
-//! A frame with bit 23 set asks for a register; the chip shifts it out through SDO in the frame that follows, whatever
-//! that one writes. SDO is valid up to 40 ns after the clock's rising edge and is sampled at the falling one, so that
+//! A frame with bit 23 set asks for a register; the chip shifts it out through SDO in the frame that follows, independent
+//! of that frame's content. SDO is valid up to 40 ns after the clock's rising edge and is sampled at the falling one, so that
 //! frame needs a clock below about 10 MHz. The fourth frame of a write asks, and the chip answers in a slow one that
 //! [`Ad5754r::begin`] starts: the codes of A, B and C and the power register in turn. A wrong code, a chip that lost its
 //! supply, an overloaded or overheated output and a broken SDO are found within four ticks.
@@ -54,6 +54,7 @@ const POWER_UP: u16 = 0b1_1111;
 /// The bits of the power register that mean something: over-current of D to A (10..7), over-temperature (5), powered
 /// parts (4..0).
 const POWER_BITS: u16 = 0b111_1011_1111;
+/// The bits of a code's register: all.
 const ALL_BITS: u16 = u16::MAX;
 
 /// From power-up until outputs may be written: at least 10 us.
@@ -77,7 +78,7 @@ pub trait Sequencer {
     /// The error of a bus that did not work.
     type Error: Copy;
 
-    /// Starts to send three frames, to pulse /LDAC, and to send the fourth frame, as fast as the chip can listen. Returns at once;
+    /// Starts to send three frames, to pulse /LDAC, and to send the fourth frame, as fast as the chip can receive. Returns at once;
     /// what was started before has been finished.
     fn start_writing(&mut self, frames: [[u8; 3]; 4]);
 
@@ -174,13 +175,13 @@ where
         }
     }
 
-    /// Powers the converter up, at zero volts on all outputs, and checks that it did what it was told; only then it lets
+    /// Powers the converter up, at zero volts on all outputs, and checks that it carried out its commands; only then it lets
     /// go of /CLR.
     ///
     /// # Errors
     /// The bus' error, or a chip that does not answer as it should: not powered, not wired, another chip.
     pub fn start(&mut self) -> Result<(), Error<Bus::Error>> {
-        // The range goes first: at power-up the outputs come on in whatever range is set then.
+        // The range goes first: at power-up the outputs come on in the range that is set then.
         self.bus.start_writing([
             frame(register::RANGE | ALL_CHANNELS, RANGE_10_V_BIPOLAR),
             frame(register::CONTROL | CONTROL_OPTIONS, OPTIONS),

@@ -1,7 +1,7 @@
 //! Frames as steps of a timer, so that they leave while the processor does something else.
 //!
 //! In every step the timer makes DMA write twice: a change of /SYNC and /LDAC, then a byte to the bus. A frame takes four
-//! steps: /SYNC falls before its first byte, and rises before a byte more, which the chip does not hear. No hardware but a
+//! steps: /SYNC falls before its first byte, and rises before a byte more, which the chip does not receive. No hardware but a
 //! timer, two DMA streams and an SPI is needed, and the frames have gaps that the SPI alone cannot make.
 
 /// A change of the pins at the beginning of a step.
@@ -62,7 +62,7 @@ pub struct Hardware {
 
 /// Count of the timer at which the pins change in a step. Not zero, where it rests.
 pub const PINS_AT: u32 = 2;
-/// Count of the timer at which the byte is written: after the pins, whatever delays them, as one DMA controller makes both writes
+/// Count of the timer at which the byte is written: after the pins, even if they are late, as one DMA controller makes both writes
 /// one after the other.
 pub const BYTE_AT: u32 = 6;
 

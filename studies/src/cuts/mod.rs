@@ -31,10 +31,13 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
-/// Length of a run, s; its first part, which is not compared; a window, and the way from one to the next.
+/// Length of a run, s.
 const RUN_S: f64 = 45.0;
+/// First part of a run, which is not compared, s.
 const FIRST_S: f64 = 5.0;
+/// Length of a window, s.
 const WINDOW_S: f64 = 2.0;
+/// Time from one window to the next, s.
 const STRIDE_S: f64 = 0.1;
 /// Excess of an error that is none, RMS, um: a count of the encoder.
 const FLOOR_UM: f64 = 0.5;

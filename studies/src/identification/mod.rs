@@ -1,6 +1,6 @@
 //! Identification judged by the truth that was hidden from it: three axes, several noise levels, several seeds.
 //!
-//! Two pairs of parameters cannot be told apart from motion, so each pair is judged as what it shows: the viscous friction and
+//! Two pairs of parameters cannot be separated by motion, so each pair is judged as what it shows: the viscous friction and
 //! the linear damping as the total damping `B + A sigma`, and a direction's friction levels with the amplifier's offset.
 
 pub mod command;

@@ -190,7 +190,7 @@ pub fn laws_section(laws: &[TunedLaw], outcomes: &[LawOutcome]) -> Section {
         prose: vec![
             "Every law keeps the same bounds on sensitivity at small errors, on the same identified model, and uses them up. What the \
              bounds leave free in it was tried over a grid on a twin of the axis that is made of identified parameters alone; the \
-             smallest RMS error without feedforward won. Then each ran on the axis itself, whose truth no one was told."
+             smallest RMS error without feedforward won. Then each ran on the axis itself, whose true parameters no law knew."
                 .to_owned(),
             closeness(outcomes),
         ],

@@ -45,7 +45,7 @@ pub enum LawsError {
 }
 
 /// Studies axis `index` (0 to 2) of the simulated stage, of which `stage` is what is known, with `seeds` noise seeds from
-/// `seed` on. `advance` is told shares of the whole, from any thread.
+/// `seed` on. `advance` receives shares of the whole, from any thread.
 ///
 /// # Errors
 /// An axis that cannot be measured or tuned, or a failed run.

@@ -117,7 +117,7 @@ struct Bench<'a> {
     seed: u64,
 }
 
-/// Tunes every law for an axis. `characteristic` is its measured trajectory, for NCTF. `progress` is told the share that
+/// Tunes every law for an axis. `characteristic` is its measured trajectory, for NCTF. `progress` receives the share that
 /// is done, 0 to 1.
 ///
 /// # Errors
@@ -282,8 +282,8 @@ impl Bench<'_> {
             nonlinear: Some(steepest(slope, range_mm)),
             ..pid.clone()
         };
-        let bears = slope > 1.0;
-        let ranges = RANGES_MM.into_iter().filter(|_| bears);
+        let allows_gain = slope > 1.0;
+        let ranges = RANGES_MM.into_iter().filter(|_| allows_gain);
         ranges.map(|range_mm| (range_mm, with(range_mm))).collect()
     }
 

@@ -14,8 +14,9 @@ use super::starts::nominal;
 /// Length of the rest, s: an hour.
 const REST_S: f64 = 3600.0;
 
-/// Cycles of the sine before a change, and after it.
+/// Cycles of the sine before a change.
 const BEFORE: f64 = 2.25;
+/// Cycles of the sine after it.
 const AFTER: f64 = 3.25;
 
 /// Before and after: friction and mass over the nominal ones; the rest between.

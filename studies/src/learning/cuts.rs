@@ -19,12 +19,14 @@ const PASSING_HZ: [f64; 9] = [20.0, 35.0, 50.0, 70.0, 100.0, 200.0, 300.0, 500.0
 /// Cycles of the sine, the last of which is scored.
 const CYCLES: f64 = 3.25;
 
-/// Sinusoidal loads at rest: frequency, Hz, and amplitude, V, those of the compliance.
+/// Frequencies of the sinusoidal loads at rest, Hz: those of the compliance.
 const LOADS_HZ: [f64; 2] = [5.0, 10.0];
+/// Amplitude of these loads, V.
 const LOAD_V: f64 = 0.3;
 
-/// Time of a load at rest, s, and its last part, which is scored.
+/// Time of a load at rest, s.
 const LOADED_S: f64 = 6.0;
+/// Last part of it, which is scored, s.
 const SCORED_S: f64 = 2.0;
 
 /// Speed of the spindle where nothing is cut, Hz: that of the slot.
@@ -115,14 +117,15 @@ fn cases() -> Vec<Case> {
     all
 }
 
-/// Errors of the speed that the law is told, %.
+/// Errors of the speed setting, %.
 const SPEED_ERRORS: [f64; 7] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0, -1.0];
 
-/// Rates of a ramp through the spindle's speed, rpm/s, and its ends, Hz of the teeth.
+/// Rates of a ramp through the spindle's speed, rpm/s.
 const RAMPS_RPM_S: [f64; 3] = [100.0, 1000.0, 10_000.0];
+/// Ends of this ramp, Hz of the teeth.
 const RAMP_HZ: (f64, f64) = (20.0, 200.0);
 
-/// The slot with a spindle whose speed is not what the law is told; nothing for an axis without a plant.
+/// The slot with a spindle whose speed differs from the setting; nothing for an axis without a plant.
 pub(super) fn speeds(
     stage: &StageSettings,
     axis: &AxisSettings,
@@ -133,14 +136,14 @@ pub(super) fn speeds(
     }
     let rate_hz = stage.rate_hz;
     let case = Case::cut(Milling::slot().tooth_passing_hz());
-    let told = |percent: f64| 60.0 * case.spindle_hz * (1.0 + percent / 100.0);
+    let setting_rpm = |percent: f64| 60.0 * case.spindle_hz * (1.0 + percent / 100.0);
     let hz_to_rpm = |passing_hz: f64| 60.0 * passing_hz / f64::from(Milling::slot().teeth);
     let (low, high) = (hz_to_rpm(RAMP_HZ.0), hz_to_rpm(RAMP_HZ.1));
-    // The name, the speed at first, the speed that is told at the start of the motion, and the rate of the change.
+    // The name, the speed at first, the speed that is set at the start of the motion, and the rate of the change.
     let mut runs = vec![("off".to_owned(), 0.0, 0.0, 1e4)];
     runs.extend(SPEED_ERRORS.map(|percent| {
-        let rpm = told(percent);
-        (format!("told {percent:+} %"), rpm, rpm, 1e4)
+        let rpm = setting_rpm(percent);
+        (format!("set {percent:+} %"), rpm, rpm, 1e4)
     }));
     for ramp in RAMPS_RPM_S {
         runs.push((
@@ -158,7 +161,7 @@ pub(super) fn speeds(
     }
     let rows = runs
         .into_par_iter()
-        .map(|(name, first, told, ramp_rpm_s)| {
+        .map(|(name, first, set, ramp_rpm_s)| {
             let mut row = vec![Cell::text(name)];
             for friction in Friction::ALL {
                 let mut axis = friction.of(axis);
@@ -168,7 +171,7 @@ pub(super) fn speeds(
                     ..CancellingSettings::default()
                 });
                 let mut phase = case.phase.clone();
-                phase.spindle_rpm = Some(told);
+                phase.spindle_rpm = Some(set);
                 match run(stage, &axis, &[phase], &mut Nothing, seed) {
                     Ok(traces) => {
                         // A ramp lasts long: all but the first cycle counts.
@@ -189,7 +192,7 @@ pub(super) fn speeds(
     }
     Ok(Some(Table {
         id: "spindle".to_owned(),
-        caption: "Simulated. The slot with cancelling, its law told another speed than the spindle's, and led through it by a ramp: \
+        caption: "Simulated. The slot with cancelling, its speed setting unlike the spindle's, and led through it by a ramp: \
                   largest and RMS errors after the first cycle, feedforward without, fixed and learning"
             .to_owned(),
         columns,

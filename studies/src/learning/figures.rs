@@ -9,13 +9,16 @@ use quadrant_sim::report::{Figure, Lines, Plot, Series, Style, decimate};
 use super::run::{Friction, Nothing, Phase, SINE, Trace, cycle_s, run};
 use super::starts::nominal;
 
-/// Cycles before the step of friction, and after it; friction after it.
+/// Cycles before the step of friction.
 const BEFORE: f64 = 0.75;
+/// Cycles after it.
 const AFTER: f64 = 2.25;
+/// Friction after the step, over that before.
 const STEPPED: f64 = 1.5;
 
-/// Cycles of the slot, and the time before its end at which what is shown begins, with its length, s: a reversal.
+/// Cycles of the slot.
 const SLOT: f64 = 3.25;
+/// Start of what is shown before the end of the slot, and its length, s: a reversal.
 const SHOWN_S: (f64, f64) = (10.3, 1.2);
 
 /// Points of a curve: as many as a page's width shows.

@@ -11,7 +11,7 @@ use super::starts::{MINUTE_CYCLES, nominal, with_gains};
 const FACTORS: [f64; 4] = [0.5, 1.0, 1.5, 2.0];
 
 /// The settings of an axis with the simulated axis' own friction model, `factor` times what it was.
-fn told(axis: &AxisSettings, factor: f64) -> AxisSettings {
+fn with_true_friction(axis: &AxisSettings, factor: f64) -> AxisSettings {
     let truth = nominal().with_friction(factor);
     let mut axis = axis.clone();
     axis.friction.sliding = truth.friction;
@@ -31,7 +31,7 @@ pub(super) fn table(
             let competitors = [
                 Friction::Without.of(axis),
                 Friction::Fixed.of(&with_gains(axis, factor)),
-                Friction::Fixed.of(&told(axis, factor)),
+                Friction::Fixed.of(&with_true_friction(axis, factor)),
                 Friction::Learning.of(axis),
             ];
             let mut row = vec![Cell::text(format!("x {factor}"))];

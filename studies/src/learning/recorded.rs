@@ -1,7 +1,7 @@
 //! Learning on friction that nobody modelled: the recorded friction of EMPS acts on a frictionless axis that follows the recorded
 //! motion. The first half of the record is there to be fitted to and learnt from, the second is scored.
 //!
-//! Friction is what is left of the recorded voltage without inertia. It acts as the record has it, whatever the axis does: right as
+//! Friction is what is left of the recorded voltage without inertia. It acts as the record has it, in every motion: right as
 //! long as the axis stays within micrometres of the recorded motion.
 
 use std::path::Path;
@@ -142,7 +142,7 @@ pub(super) fn table(path: &Path, seed: u64) -> anyhow::Result<Table> {
         caption: "Recorded friction of EMPS on a simulated axis under a PID: RMS and largest error of the second half of the record"
             .to_owned(),
         columns: vec![
-            Column::new("friction told"),
+            Column::new("friction set"),
             um("RMS, without"),
             um("largest, without"),
             um("RMS, fixed"),

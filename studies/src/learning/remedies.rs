@@ -15,8 +15,9 @@ use quadrant_sim::design::{OpenLoop, SampledLoop};
 
 use super::run::Addition;
 
-/// Bounds of sensitivity and complementary sensitivity that the commissioning designs for.
+/// Bound of the sensitivity that the commissioning designs for.
 const MOST_S: f64 = 1.7;
+/// Bound of the complementary sensitivity that it designs for.
 const MOST_T: f64 = 1.5;
 
 /// A low-pass of second order, with its derivatives.
@@ -42,7 +43,7 @@ impl LowPass {
     }
 }
 
-/// Disturbance observer of the nominal plant that is told of the friction feedforward, so that it takes away only what that
+/// Disturbance observer of the nominal plant that receives the friction feedforward, so that it takes away only what that
 /// leaves.
 pub(super) struct Observer {
     plant: PlantModel,
@@ -127,16 +128,19 @@ impl Addition for Observer {
     }
 }
 
-/// Corner above which the error is vibration, and that above which friction averages it out, Hz.
+/// Corner above which the error is vibration, Hz.
 const VIBRATION_HZ: f64 = 40.0;
+/// Corner above which friction averages it out, Hz.
 const AVERAGED_HZ: f64 = 75.0;
 /// Corner above which the encoder's noise outweighs vibration, Hz.
 const NOISE_HZ: f64 = 400.0;
-/// Time over which the fed model's output and the vibration's power are averaged, s.
+/// Time over which the fed model's output is averaged, s.
 const AVERAGE_S: f64 = 0.01;
+/// Time over which the vibration's power is averaged, s.
 const POWER_S: f64 = 0.05;
-/// Amplitude of the vibration's velocity that halves, as the gate's, and that which is none yet, mm/s.
+/// Amplitude of the vibration's velocity that halves, as the gate's, mm/s.
 const HALF_MM_S: f64 = 2.0;
+/// Largest amplitude that does not count as vibration, mm/s.
 const QUIET_MM_S: f64 = 1.5;
 
 /// One-pole high-pass.

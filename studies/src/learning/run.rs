@@ -65,12 +65,13 @@ pub(super) struct Phase {
     /// The axis as it then is, and what pushes it, from the beginning of the phase on.
     pub(super) truth: AxisParameters,
     pub(super) load: Load,
-    /// Speed of the spindle that the law is told at its beginning, rpm.
+    /// Speed of the spindle that is set at its beginning, rpm.
     pub(super) spindle_rpm: Option<f64>,
 }
 
-/// Amplitude and velocity of the usual sine, mm and mm/s, and its lead-in, s: those of the comparison.
+/// Amplitude and velocity of the usual sine, mm and mm/s: those of the comparison.
 pub(super) const SINE: (f64, f64) = (30.0, 10.0);
+/// Its lead-in, s.
 const LEAD_S: f64 = 0.5;
 /// Time for a motion to begin, s.
 const START_S: f64 = 0.1;
@@ -211,7 +212,7 @@ pub(super) fn run(
             if tick == starting
                 && let Some(rpm) = phase.spindle_rpm
             {
-                machine.tell_spindle(SpindleSpeed::from_rpm(rpm, 1.0 / rate_hz));
+                machine.set_spindle_speed(SpindleSpeed::from_rpm(rpm, 1.0 / rate_hz));
             }
             if tick == starting && moves {
                 requests.push(Command::StartMove(AxisName::X));

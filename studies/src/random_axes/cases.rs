@@ -13,8 +13,9 @@ use super::{Line, Outcome, Path, judge_subject};
 
 /// Stiffness of the pre-sliding range of LuGre and Dahl, V/mm: that of the simulated stage's x axis.
 const STIFFNESS_V_PER_MM: f64 = 15.0;
-/// Damping of the resonances, and the motor's share of the mass.
+/// Damping of the resonances.
 const DAMPING: f64 = 0.03;
+/// The motor's share of the mass.
 const MOTOR_SHARE: f64 = 0.5;
 /// Time in which an axis warms, s.
 const WARMS_S: f64 = 300.0;

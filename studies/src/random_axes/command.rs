@@ -50,11 +50,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(folder) = &arguments.pages {
         fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     }
-    let wanted = |seed: u64| !arguments.rigid || RandomAxis::new(seed).is_rigid();
+    let is_requested = |seed: u64| !arguments.rigid || RandomAxis::new(seed).is_rigid();
     let lines = arguments.campaign.lines(
         &arguments.results,
         "commissioning random axes",
-        wanted,
+        is_requested,
         |seed| judge_with_page(seed, arguments.pages.as_deref()),
     )?;
     summary(&lines);

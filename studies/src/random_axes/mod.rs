@@ -38,17 +38,17 @@ pub use subject::Subject;
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum Outcome {
-    /// Settings were handed over that beat the PID.
+    /// The chosen settings beat the PID.
     Commissioned,
     /// Nothing was better than the PID, and its settings were kept.
     PidAlone,
-    /// Settings were handed over that are worse than the PID on a motion that the commissioning did not see.
+    /// The chosen settings are worse than the PID on a motion that the commissioning did not see.
     WorseThanPid,
     /// The commissioning ended early, and its reason names the resonance that the axis has.
     Refused,
     /// It ended early for another reason, though every axis of the campaign can be controlled.
     RefusedWrongly,
-    /// The axis left its travel while it was commissioned, whatever became of it.
+    /// The axis left its travel while it was commissioned, with any outcome.
     LeftTravel,
 }
 
@@ -72,13 +72,13 @@ pub struct Line {
     /// Small slow sines on which it is worse than the PID.
     #[serde(default)]
     pub small_worse: usize,
-    /// Error over that of the PID, the worst of the trials by which the commissioning handed its law over.
+    /// Error over that of the PID, the worst of the trials by which the commissioning chose its law.
     #[serde(default)]
     pub trial_worst: Option<f64>,
     /// Acceleration per volt that was identified, over the true one.
     #[serde(default)]
     pub gain_ratio: Option<f64>,
-    /// Feedforward that was handed over.
+    /// Feedforward that was chosen.
     pub feedforward: String,
     /// Time for which the axis was used, min.
     pub axis_min: f64,
@@ -402,7 +402,7 @@ impl Line {
             return;
         }
         let pid = measuring_settings(&found.settings);
-        // Under the limits that were handed over; where the PID leaves those, both have room.
+        // Under the limits of the result; where the PID leaves those, both have room.
         let narrow = AxisSettings {
             limits: found.settings.limits,
             ..pid.clone()

@@ -10,11 +10,13 @@ use quadrant_sim::report::{Block, Cell, Column, Figure, Page, Section, Series, S
 
 use super::{Judged, Subject};
 
-/// Velocities of the figure of sliding friction, mm/s: smallest and largest, and their number.
+/// Least and largest velocity of the figure of sliding friction, mm/s.
 const VELOCITIES_MM_S: (f64, f64) = (0.05, 100.0);
+/// Number of these velocities.
 const VELOCITIES: usize = 120;
-/// Displacements of the figure of the virgin curve: largest, mm, and their number.
+/// Largest displacement of the figure of the virgin curve, mm.
 const LARGEST_MM: f64 = 0.15;
+/// Number of displacements.
 const DISPLACEMENTS: usize = 150;
 
 /// The page of an axis that was judged.

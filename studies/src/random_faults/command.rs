@@ -77,7 +77,7 @@ fn summary(lines: &BTreeMap<u64, Line>) {
     let (unseen, mut farthest): (Vec<&Line>, Vec<&Line>) =
         lines.values().partition(|line| line.unseen == Some(true));
     say!(
-        "nothing tells that the encoder died: {}, at most {:.2} mm off",
+        "nothing shows that the encoder died: {}, at most {:.2} mm off",
         unseen.len(),
         unseen.iter().map(way).fold(0.0, f64::max)
     );

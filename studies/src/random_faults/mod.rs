@@ -24,29 +24,34 @@ use serde::{Deserialize, Serialize};
 const LARGEST_WORD: i16 = 32_767;
 /// Ticks from a fault that stops to outputs that are off: 105 ms of braking, 200 ticks of rest.
 const STOP_TICKS: u32 = 1050 + 200;
-/// Way of the x axis that its reference does not ask for until the outputs are off, mm; and in motions slower than so many
-/// mm/s, where what friction holds hides a dead encoder for longer, and still slower: the voltage of an axis that slides grows as
-/// the following error does, by its reference, and until it has grown by what friction may hold, the axis gains speed.
+/// Largest unplanned way of the x axis until the outputs are off, mm.
 const UNPLANNED_MM: f64 = 2.1;
+/// The same in motions slower than [`SLOW_MM_S`], mm: what friction holds there hides a dead encoder for longer.
 const SLOW_UNPLANNED_MM: f64 = 17.0;
+/// Speed below which that counts, mm/s.
 const SLOW_MM_S: f64 = 2.0;
+/// The same in motions slower than [`SLOWEST_MM_S`], mm: the voltage grows as slowly as the following error does, and the axis gains
+/// speed until the voltage has grown by what friction may hold.
 const SLOWEST_UNPLANNED_MM: f64 = 25.0;
+/// Speed below which that counts, mm/s.
 const SLOWEST_MM_S: f64 = 0.15;
 /// The same under a voltage that is injected in closed loop, mm: it goes to and fro, and so does what is seen of the motion.
 const INJECTED_UNPLANNED_MM: f64 = 3.5;
-/// The same, mm, where an encoder shows counts of its own; and below so many mm/s they are taken for a motion.
+/// The same where an encoder shows counts of its own, mm.
 const FLICKERING_UNPLANNED_MM: f64 = 15.0;
+/// Speed below which such counts pass for a motion, mm/s.
 const FLICKERING_MM_S: f64 = 10.0;
 /// Speed below which a motion that ends does so before such an encoder is found, mm/s.
 const FLICKERING_TO_REST_MM_S: f64 = 60.0;
 /// Speed below which an axis comes to rest, mm/s: if its encoder dies then, the voltage that it has may be that of a load.
 const COMING_TO_REST_MM_S: f64 = 30.0;
-/// The distance that an axis coasts, mm per mm/s: 1 / B of the plant; and that which the largest output adds while on its way,
-/// A V Td / B, mm.
+/// Distance that an axis coasts over its speed, s: 1 / B of the plant.
 const COASTING_S: f64 = 1.0 / 144.8;
+/// Distance that the largest output adds within the dead time, A V Td / B, mm.
 const COASTING_MM: f64 = 69_390.0 * 10.0 * 1.2e-3 / 144.8;
-/// Ticks of a campaign, and the last one in which something happens.
+/// Ticks of a campaign.
 const TICKS: u32 = 10_000;
+/// Last tick in which something happens.
 const LAST_EVENT: u32 = 8_000;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -186,7 +191,7 @@ impl Campaign {
         self.events.iter().any(is_load)
     }
 
-    /// True if nothing that the law sees tells that an encoder died at this speed: `docs/safety.md`, "Not found".
+    /// True if nothing that the law sees shows that an encoder died at this speed: `docs/safety.md`, "Not found".
     fn is_unseen(&self, death: Death, speed_mm_s: f64) -> bool {
         let stops = |(_, event): &(u32, Event)| *event == Event::Stop;
         let goes_on = matches!(self.activity, Activity::Jog(_) | Activity::Home)
@@ -431,7 +436,7 @@ fn run(campaign: &Campaign) -> Result<End, String> {
 struct End {
     /// Largest way that was not planned, mm.
     unplanned_mm: f64,
-    /// Nothing that the law sees tells that the encoder died.
+    /// Nothing that the law sees shows that the encoder died.
     unseen: bool,
     /// The first fault's number.
     fault: Option<u8>,
@@ -447,7 +452,7 @@ pub struct Line {
     pub broken: String,
     /// Largest way that the reference did not ask for until the outputs were off, mm.
     pub unplanned_mm: Option<f64>,
-    /// Nothing that the law sees tells that the encoder died.
+    /// Nothing that the law sees shows that the encoder died.
     pub unseen: Option<bool>,
     /// Number of the first fault.
     pub fault: Option<u8>,

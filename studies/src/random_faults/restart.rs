@@ -8,8 +8,9 @@ use quadrant_settings::StageSettings;
 
 /// Room for GMS elements.
 const ELEMENTS: usize = 8;
-/// Origins of the set that a campaign may begin with, and of those that it stores.
+/// Origin of the set that a campaign may begin with.
 const BEFORE: &str = "before";
+/// Origin of the sets that a campaign stores.
 const DURING: &str = "during";
 /// Ticks after the start for which nothing may be enabled.
 const QUIET_TICKS: u32 = 500;
@@ -44,7 +45,7 @@ pub(super) struct Before {
     pub(super) has_stored: bool,
     /// Some of its words no longer change.
     pub(super) is_worn: bool,
-    /// A host was told that its settings are kept.
+    /// A host has the reply that its settings are kept.
     pub(super) acknowledged: bool,
 }
 
@@ -99,7 +100,7 @@ pub(super) fn check(flash: Flash, before: &Before, seed: u64) -> Result<(), Stri
     }
 }
 
-/// Starts on damaged settings: nothing enables, whoever asks.
+/// Starts on damaged settings: no station can enable.
 fn stays_off(flash: Flash) -> Result<(), String> {
     let default = StageSettings::default();
     let mut tasks = Tasks::with_flash(&default, 1, flash, Some(&default));

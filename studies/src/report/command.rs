@@ -59,8 +59,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         );
         return Ok(());
     }
-    let wanted = |part: &&Part| only.is_empty() || only.iter().any(|id| id == part.id);
-    let parts: Vec<Part> = PARTS.iter().filter(wanted).copied().collect();
+    let is_requested = |part: &&Part| only.is_empty() || only.iter().any(|id| id == part.id);
+    let parts: Vec<Part> = PARTS.iter().filter(is_requested).copied().collect();
     let bar = share("report");
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
     let done = compute(

@@ -49,7 +49,7 @@ impl Context {
     }
 
     /// Runs the comparison of chapter 5, and the best PID on the same sines of the first amplitude, unless a part before did.
-    /// `advance` is told shares of the whole.
+    /// `advance` receives shares of the whole.
     ///
     /// # Errors
     /// A model that no PID keeps the bounds on, a refused setting or a fault.

@@ -21,8 +21,9 @@ use crate::thesis::chapter4::{chapter4_sections, data_section};
 
 /// Share of chapter 3's time after which the commissioning is done and the cross-checks begin.
 const COMMISSIONED: f64 = 0.7;
-/// Standard deviations of A, B, C and Td, as shares, and draws: as `quadrant design npid` has them.
+/// Standard deviations of A, B, C and Td, as shares: those of `quadrant design npid`.
 const DEVIATIONS: [f64; 4] = [0.05, 0.10, 0.30, 0.05];
+/// Number of draws.
 const DRAWS: usize = 2000;
 /// Heights of the steps, mm: within the encoder's noise, across emax, as `quadrant design npid` has them.
 const STEPS_MM: [f64; 2] = [0.01, 0.1];

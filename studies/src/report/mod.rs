@@ -29,7 +29,7 @@ pub struct Part {
     pub expected_s: fn(&Context) -> f64,
     /// True if it needs [`Context::comparison`], the runs of chapter 5, which parts of one report share.
     pub needs_comparison: bool,
-    /// Computes it. The same context must give the same sections, whatever the number of threads.
+    /// Computes it. The same context must give the same sections, for any number of threads.
     pub run: fn(&Context, &Progress) -> anyhow::Result<Vec<Section>>,
 }
 
@@ -111,7 +111,7 @@ pub struct Done {
     pub sections: Vec<Section>,
 }
 
-/// Computes the parts one after the other, or takes them from their files. `tell` gets a line for each part that is not
+/// Computes the parts one after the other, or takes them from their files. `report_line` gets a line for each part that is not
 /// computed, and for each file that cannot be used.
 ///
 /// # Errors
@@ -119,7 +119,7 @@ pub struct Done {
 pub fn compute(
     request: &Request<'_>,
     bar: &indicatif::ProgressBar,
-    tell: &mut dyn FnMut(String),
+    report_line: &mut dyn FnMut(String),
 ) -> anyhow::Result<Vec<Done>> {
     let Request { context, .. } = request;
     let store = Store::new(&request.folder)?;
@@ -132,7 +132,7 @@ pub fn compute(
                 _ if request.fresh => None,
                 Stored::Missing => None,
                 Stored::Unusable(reason) => {
-                    tell(format!("{reason}: {} is computed again", part.id));
+                    report_line(format!("{reason}: {} is computed again", part.id));
                     None
                 }
                 Stored::Sections(sections) => Some(sections),
@@ -162,7 +162,7 @@ pub fn compute(
         .map(|((part, (key, sections)), expected_s)| {
             if let Some(sections) = sections {
                 let path = store.path(part.id);
-                tell(format!("{}: kept from {}", part.id, path.display()));
+                report_line(format!("{}: kept from {}", part.id, path.display()));
                 return Ok(Done {
                     part: *part,
                     sections,

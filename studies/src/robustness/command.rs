@@ -44,8 +44,9 @@ pub struct Arguments {
     output: Output,
 }
 
-/// Sampling of the cutting force that is written, s, and its samples: ten turns of the spindle.
+/// Sampling time of the cutting force that is written, s.
 const FORCE_PERIOD_S: f64 = 2e-4;
+/// Its samples: ten turns of the spindle.
 const FORCE_SAMPLES: usize = 1000;
 
 /// Runs the study, prints its tables and writes its page.

@@ -23,8 +23,9 @@ pub const LOAD_V: f64 = 0.3;
 pub const FREQUENCIES_HZ: [f64; 12] = [
     1.0, 2.0, 5.0, 10.0, 20.0, 35.0, 50.0, 70.0, 100.0, 140.0, 200.0, 300.0,
 ];
-/// Cycles and time that a load lasts, whichever is longer; the second half is scored.
+/// Cycles that a load lasts at least; the second half is scored.
 const CYCLES: f64 = 8.0;
+/// Time that a load lasts at least, s.
 const LEAST_S: f64 = 1.0;
 
 /// Largest error over the load's amplitude.

@@ -151,7 +151,7 @@ pub fn run_robustness(
                         .run()
                         .map_err(|stopped| stopped.named(competitor, &scenario.name));
                     progress();
-                    // Traces are long: all but those that are wanted go at once.
+                    // Traces are long: all but the requested ones go at once.
                     ended.map(|mut ended| {
                         if index > 0 || !scenario.keeps_trace {
                             ended.trace = None;

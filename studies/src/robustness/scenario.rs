@@ -62,8 +62,9 @@ const HOLD: Task = Task::Hold {
     seconds: 4.0,
     scored_from: 0.0,
 };
-/// Time of the tool in the material, s: during a hold and a slow move, and from start to end of a sine.
+/// Start and end of the cut in a hold and in a slow move, s.
 const ENGAGED_S: (f64, f64) = (1.0, 3.0);
+/// The same in a sine, s: all of it.
 const ALWAYS_S: (f64, f64) = (0.0, 1e3);
 
 /// A cut whose force across the feed acts along the axis.

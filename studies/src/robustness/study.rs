@@ -85,12 +85,12 @@ pub fn run_study(
     request: &StudyRequest,
     progress: &(dyn Fn() + Sync),
 ) -> Result<RobustnessReport, StudyError> {
-    let wanted = |name: &str| {
+    let is_requested = |name: &str| {
         let only = request.only.as_deref();
         only.is_none_or(|text| name.contains(text))
     };
     let mut cases = drive_cases(request.axis, request.backlash_mm);
-    cases.retain(|case| wanted(&case.name));
+    cases.retain(|case| is_requested(&case.name));
     let (drives, refused) = commission_drives(request.axis, cases, request.seed, progress);
     let mut runs = RobustnessRequest {
         competitors: usual_competitors(&request.stage),
@@ -100,12 +100,16 @@ pub fn run_study(
         seeds: request.seeds,
     };
     let references = ["nominal", "hold", "slow feed"];
-    runs.scenarios
-        .retain(|scenario| wanted(&scenario.name) || references.contains(&scenario.name.as_str()));
+    runs.scenarios.retain(|scenario| {
+        is_requested(&scenario.name) || references.contains(&scenario.name.as_str())
+    });
     runs.scenarios.extend(drives);
     if let Some(only) = &request.only
         && refused.is_empty()
-        && !runs.scenarios.iter().any(|scenario| wanted(&scenario.name))
+        && !runs
+            .scenarios
+            .iter()
+            .any(|scenario| is_requested(&scenario.name))
     {
         return Err(StudyError::NoScenario(only.clone()));
     }

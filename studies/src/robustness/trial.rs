@@ -38,9 +38,11 @@ pub(super) const SINE_MM_S: f64 = 10.0;
 pub(super) const FEED_MM: f64 = 10.0;
 /// Its velocity, mm/s.
 pub(super) const FEED_MM_S: f64 = 2.0;
-/// Cycles at full speed, of which the last [`SCORED_CYCLES`] count; lead-in and lead-out, s: the comparison's.
+/// Cycles at full speed: the comparison's.
 const CYCLES: f64 = 2.25;
+/// Whole cycles at the end that are scored.
 const SCORED_CYCLES: usize = 2;
+/// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;
 /// Cycles before, in which a law that learns has time to: five reversals.
 pub(super) const LEARNING_CYCLES: f64 = 2.5;

@@ -81,8 +81,8 @@ fn velocity_mm_s(run: &Recording) -> f64 {
 }
 
 /// The run whose velocity is nearest.
-fn nearest(runs: &[Recording], wanted_mm_s: f64) -> Option<&Recording> {
-    let distance = |run: &Recording| (velocity_mm_s(run) / wanted_mm_s).ln().abs();
+fn nearest(runs: &[Recording], requested_mm_s: f64) -> Option<&Recording> {
+    let distance = |run: &Recording| (velocity_mm_s(run) / requested_mm_s).ln().abs();
     runs.iter()
         .filter(|run| velocity_mm_s(run) > 0.0)
         .min_by(|a, b| distance(a).total_cmp(&distance(b)))

@@ -77,7 +77,7 @@ impl Change {
             Self::NoRipple => "no screw ripple".to_owned(),
             Self::FinerEncoder => "encoder counts of a tenth".to_owned(),
             Self::QuietEncoder => "no noise, counts of a tenth".to_owned(),
-            Self::Elements(count) => format!("{count} GMS elements, identified anew"),
+            Self::Elements(count) => format!("{count} GMS elements, identified again"),
             Self::TrueElements => "true GMS elements".to_owned(),
             Self::TrueFriction => "true friction".to_owned(),
             Self::Preview(periods) => format!("preview {periods:+} control period"),
@@ -137,7 +137,7 @@ impl Change {
     }
 }
 
-/// Reason that something could not be identified anew.
+/// Reason that something could not be identified again.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// Settings that the axis refuses.
@@ -204,11 +204,11 @@ pub struct Finding {
     pub outcome: Result<Comparison, StudyError>,
 }
 
-/// Runs PID and the best configuration on every changed plant, with `seeds` seeds from `seed` on. `advance` is told
-/// the share of the whole that was done since it was last told.
+/// Runs PID and the best configuration on every changed plant, with `seeds` seeds from `seed` on. `advance` receives
+/// the share of the whole that was done since its last call.
 ///
 /// # Errors
-/// The first run that fails. An identification that does is told in its finding: it is an answer, too.
+/// The first run that fails. An identification that does is reported in its finding: it is an answer, too.
 pub fn study(
     setup: &RunConfiguration,
     changes: &[Change],

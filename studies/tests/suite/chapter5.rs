@@ -16,7 +16,7 @@ use quadrant_studies::thesis::chapter5::chapter5_sections;
 use quadrant_studies::thesis::headline::{headline_section, study_section};
 use quadrant_studies::thesis::imperfections::{Change, study};
 
-/// A comparison with scores that tell the entries apart: 100 um for PID alone and for the best PID, half of it under N-PID, a tenth of what
+/// A comparison with scores that distinguish the entries: 100 um for PID alone and for the best PID, half of it under N-PID, a tenth of what
 /// was there with each further feedforward; two seeds, 1 % apart.
 fn made_up() -> Comparison {
     let mut entries = Vec::new();
@@ -227,7 +227,7 @@ fn switching_an_imperfection_off_changes_that_and_nothing_else() {
 }
 
 #[test]
-fn an_identification_that_fails_is_told_and_the_others_are_shown() {
+fn an_identification_that_fails_is_reported_and_the_others_are_shown() {
     let [_, setup] = RunConfiguration::both(&identified_settings().unwrap().stage);
     let findings = study(
         &setup,

@@ -26,7 +26,7 @@ fn under_random_cuts_learning_is_hardly_ever_worse_than_no_feedforward_and_far_b
 }
 
 #[test]
-fn a_voltage_that_the_axis_answers_aside_of_its_model_shakes_it_no_longer_than_the_guard_allows() {
+fn a_voltage_in_quadrature_to_the_model_shakes_the_axis_no_longer_than_the_guard_allows() {
     // Friction's springs and the mass resonate near the teeth's frequency: the worst windows were x 12 and x 17.
     for seed in [886, 1039] {
         let line = judge(seed, None);

@@ -114,7 +114,7 @@ fn axes_whose_pid_oscillates_while_friction_holds_them_get_a_softer_one_and_are_
 /// An axis that kept the PID alone before other kinds were tried after the withheld sines had refused the best: Dahl's model ends in a
 /// false alarm on it.
 #[test]
-fn an_axis_on_which_the_best_law_is_refused_is_handed_the_next() {
+fn an_axis_on_which_the_best_law_is_refused_gets_the_next() {
     let line = judge(18780);
     assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
     assert!(line.mean_ratio.unwrap() < 0.6, "{line:?}");

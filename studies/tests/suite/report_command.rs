@@ -14,7 +14,7 @@ fn report(folder: &Path, threads: &str, arguments: &[&str]) -> Output {
 }
 
 /// Returns the progress lines of a report that must succeed.
-fn told(output: &Output) -> String {
+fn progress_lines(output: &Output) -> String {
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{errors}");
     errors
@@ -29,7 +29,7 @@ fn a_part_is_the_same_to_the_byte_from_its_file_and_computed_again_on_another_nu
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let first = report(at, "2", &["--only", "chapter-4", "--out", "a"]);
-    assert!(!told(&first).contains("kept from"));
+    assert!(!progress_lines(&first).contains("kept from"));
     assert!(
         shown(&first).contains("Simulated, not measured"),
         "{}",
@@ -39,11 +39,11 @@ fn a_part_is_the_same_to_the_byte_from_its_file_and_computed_again_on_another_nu
     let computed = page();
 
     let kept = report(at, "2", &["--only", "chapter-4", "--out", "a"]);
-    assert!(told(&kept).contains("chapter-4: kept from a/parts/chapter-4.json"));
+    assert!(progress_lines(&kept).contains("chapter-4: kept from a/parts/chapter-4.json"));
     assert!(page() == computed, "a page from files differs");
 
     let fresh = report(at, "1", &["--only", "chapter-4", "--out", "a", "--fresh"]);
-    assert!(!told(&fresh).contains("kept from"));
+    assert!(!progress_lines(&fresh).contains("kept from"));
     assert!(page() == computed, "a page on one thread differs");
 
     let text = String::from_utf8(computed).unwrap();
@@ -65,7 +65,7 @@ fn a_part_is_the_same_to_the_byte_from_its_file_and_computed_again_on_another_nu
 fn parts_are_listed_with_their_times() {
     let folder = tempfile::tempdir().unwrap();
     let listed = report(folder.path(), "1", &["--list"]);
-    told(&listed);
+    progress_lines(&listed);
     for part in quadrant_studies::report::PARTS {
         let line = shown(&listed);
         let line = line.lines().find(|line| line.starts_with(part.id)).unwrap();

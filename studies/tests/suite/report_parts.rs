@@ -11,6 +11,7 @@ use quadrant_studies::report::{Context, Part, Progress, Request, compute};
 thread_local! {
     /// Parts computed in this test.
     static COMPUTED: Cell<u32> = const { Cell::new(0) };
+    /// True while the second part ends with an error.
     static INTERRUPTED: Cell<bool> = const { Cell::new(false) };
 }
 
@@ -64,14 +65,14 @@ const PARTS: [Part; 2] = [
     },
 ];
 
-/// The sections, or the error; what was told; how many parts were computed.
+/// The sections, or the error; the progress lines; how many parts were computed.
 fn report(
     folder: &Path,
     context: &Context,
     fresh: bool,
 ) -> (Result<Vec<Section>, String>, Vec<String>, u32) {
     COMPUTED.set(0);
-    let mut told = Vec::new();
+    let mut lines = Vec::new();
     let done = compute(
         &Request {
             parts: &PARTS,
@@ -80,12 +81,12 @@ fn report(
             fresh,
         },
         &ProgressBar::hidden(),
-        &mut |line| told.push(line),
+        &mut |line| lines.push(line),
     );
     let sections = done
         .map(|done| done.into_iter().flat_map(|done| done.sections).collect())
         .map_err(|error| format!("{error:#}"));
-    (sections, told, COMPUTED.get())
+    (sections, lines, COMPUTED.get())
 }
 
 fn context(seed: u64) -> Context {
@@ -112,15 +113,15 @@ fn an_interrupted_report_goes_on_where_it_stopped() {
     assert_eq!(computed, 1);
 
     INTERRUPTED.set(false);
-    let (resumed, told, computed) = report(folder.path(), &context, false);
+    let (resumed, lines, computed) = report(folder.path(), &context, false);
     assert_eq!(computed, 1, "the first part was computed again");
     assert!(
-        told.len() == 1 && told[0].starts_with("first: kept from"),
-        "{told:?}"
+        lines.len() == 1 && lines[0].starts_with("first: kept from"),
+        "{lines:?}"
     );
 
-    let (fresh, told, computed) = report(folder.path(), &context, true);
-    assert_eq!((computed, told.len()), (2, 0));
+    let (fresh, lines, computed) = report(folder.path(), &context, true);
+    assert_eq!((computed, lines.len()), (2, 0));
     assert!(html(resumed.unwrap()) == html(fresh.unwrap()));
 }
 
@@ -144,10 +145,10 @@ fn a_file_that_is_damaged_or_of_other_inputs_is_said_so_and_computed_again() {
     let folder = tempfile::tempdir().unwrap();
     let context_1 = context(1);
     let again = |context: &Context, reason: &str| {
-        let (sections, told, computed) = report(folder.path(), context, false);
+        let (sections, lines, computed) = report(folder.path(), context, false);
         assert!(
-            told.iter().any(|line| line.contains(reason)),
-            "{reason}: {told:?}"
+            lines.iter().any(|line| line.contains(reason)),
+            "{reason}: {lines:?}"
         );
         assert!(computed >= 1);
         sections.unwrap()
@@ -185,6 +186,6 @@ fn a_file_that_is_damaged_or_of_other_inputs_is_said_so_and_computed_again() {
     let mut other = Context::new(2, 3, LawSettings::default()).unwrap();
     other.settings.stage.axes[0].feedback.pid.kp_v_per_mm *= 1.01;
     again(&other, "first.json is of other settings");
-    let (_, told, computed) = report(folder.path(), &other, false);
-    assert_eq!(computed, 0, "{told:?}");
+    let (_, lines, computed) = report(folder.path(), &other, false);
+    assert_eq!(computed, 0, "{lines:?}");
 }

@@ -164,7 +164,7 @@ fn a_cut_s_vibration_and_not_its_mean_spoils_the_compensation() {
         .map(|k| cut.force_n(Component::Normal, f64::from(k) * 1e-4) - mean)
         .collect();
     let shaken = under(vibration);
-    // It shakes friction loose: there is less of it at a reversal than the compensation puts in.
+    // It makes the axis break away: there is less of it at a reversal than the compensation puts in.
     let pid = largest_um(&shaken, "cutting", "PID");
     assert!(pid < 0.6 * largest_um(&shaken, "nominal", "PID"));
     assert!(largest_um(&shaken, "cutting", FULL) > 1.5 * pid);

@@ -20,11 +20,13 @@ use crate::rust::{self, Law, rust_law, rust_pid};
 const TICKS: usize = 800;
 /// Control period, s.
 const PERIOD_S: f64 = 1e-4;
-/// Sine of the reference: amplitude, mm, and cycles per second.
+/// Amplitude of the reference's sine, mm.
 const AMPLITUDE_MM: f64 = 0.2;
+/// Its frequency, Hz.
 const FREQUENCY_HZ: f64 = 15.0;
-/// Amplitude of the error, mm, and its cycles in one of the reference.
+/// Amplitude of the error, mm.
 const ERROR_MM: f64 = 0.02;
+/// Its cycles in one of the reference.
 const ERROR_CYCLES: f64 = 3.7;
 /// Phase of an axis against the one before, rad: they reverse one after the other.
 const PHASE_RAD: f64 = 0.4;

@@ -7,9 +7,11 @@ use quadrant_settings::AxisSettings;
 
 /// Elements of the GMS model.
 pub(crate) const ELEMENTS: usize = 4;
-/// Octaves of a table, intervals of an octave, and nodes.
+/// Octaves of a table.
 const OCTAVES: i32 = 14;
+/// Intervals of an octave.
 const INTERVALS: usize = 16;
+/// Nodes of a table.
 pub(crate) const NODES: usize = OCTAVES as usize * INTERVALS + 2;
 
 /// Start of a table.

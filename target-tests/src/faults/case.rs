@@ -232,7 +232,7 @@ pub(crate) fn of(code: FaultCode) -> Option<Case> {
             |fixture| streams::injecting(fixture, 1.0, 0.02),
         ),
         FaultCode::Overload => Case {
-            how: "a load of 1 V on x at rest; its motor bears 0.1 V for ever, 2 V for 50 ms",
+            how: "a load of 1 V on x at rest; its motor withstands 0.1 V indefinitely, 2 V for 50 ms",
             adjust: |configuration| {
                 each(configuration, |axis| {
                     weak(axis, 2.0);

@@ -1,5 +1,5 @@
 //! `cargo xtask faults`: every fault injected from outside in the emulated firmware, with the reference model in this process beside
-//! it, and what was found held against the committed table.
+//! it, and what was found compared with the committed table.
 
 pub(crate) mod approach;
 mod at_start;
@@ -30,10 +30,10 @@ struct Table {
 /// The committed tables, by number type.
 const GOLDEN: Golden = Golden {
     path: "target-tests/golden/faults.toml",
-    head: "Written by `cargo xtask faults --overwrite-expected`; `cargo xtask faults` holds what it finds against this.",
+    head: "Written by `cargo xtask faults --overwrite-expected`; `cargo xtask faults` compares what it finds with this.",
 };
 
-/// Injects every fault, prints the table, and holds it against the committed one.
+/// Injects every fault, prints the table, and compares it with the committed one.
 pub(crate) fn run(
     toolchain: Toolchain,
     scalar: Scalar,
@@ -133,14 +133,14 @@ fn compare(key: &str, table: &Table) -> Result<()> {
     };
     ensure!(
         expected.finding.len() == table.finding.len(),
-        "{} fault injections instead of {}; if that is wanted, `cargo xtask faults --overwrite-expected` accepts it",
+        "{} fault injections instead of {}; if that is intended, `cargo xtask faults --overwrite-expected` accepts it",
         table.finding.len(),
         expected.finding.len()
     );
     for (found, expected) in table.finding.iter().zip(&expected.finding) {
         ensure!(
             found == expected,
-            "{found:?}\ninstead of\n{expected:?}\nif that is wanted, `cargo xtask faults --overwrite-expected` accepts it"
+            "{found:?}\ninstead of\n{expected:?}\nif that is intended, `cargo xtask faults --overwrite-expected` accepts it"
         );
     }
     Ok(())

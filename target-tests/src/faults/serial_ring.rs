@@ -3,7 +3,7 @@
 use quadrant::hal::Serial;
 use quadrant::lockstep::LINK_BYTES;
 
-/// A port between whose ends bytes change hands once a tick.
+/// A port between whose ends bytes are exchanged once a tick.
 #[derive(Debug, Default)]
 pub(crate) struct SerialRing {
     /// Bytes of the host that may be read.

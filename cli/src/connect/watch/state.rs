@@ -23,8 +23,9 @@ const MOST_SAMPLES: f64 = 4000.0;
 const NUDGE: f64 = 1.05;
 /// Samples that the cursor goes at a time, as a share of the window: slowly, and fast.
 const STEPS: (f64, f64) = (0.005, 0.1);
-/// Bounds of the time across a chart, s, and the factor by which it is changed.
+/// Least and largest time across a chart, s.
 const WINDOW_S: (f64, f64) = (0.1, 60.0);
+/// Factor by which this time changes.
 const ZOOM: f64 = 2.0;
 /// Share of a capture before its trigger, %.
 const BEFORE_TRIGGER: u8 = 30;
@@ -73,7 +74,7 @@ pub(super) struct Watch {
     pub(super) capturing: bool,
     pub(super) message: String,
     pub(super) help: bool,
-    /// The person was told that the outputs are on.
+    /// The person knows that the outputs are on.
     warned: bool,
     /// The key that was pressed once, and that is to be pressed again for what it starts.
     asked: Option<char>,
@@ -127,7 +128,7 @@ impl Watch {
         })
     }
 
-    /// Takes what the machine tells within `time`.
+    /// Takes what the machine reports within `time`.
     ///
     /// # Errors
     /// A connection that is broken.
@@ -137,8 +138,8 @@ impl Watch {
         self.status = client.status()?;
         self.inputs = client.inputs()?;
         self.learning = client.learning()?;
-        let told = self.fault.as_ref().map(|fault| fault.code);
-        if self.status.fault != told {
+        let reported = self.fault.as_ref().map(|fault| fault.code);
+        if self.status.fault != reported {
             self.fault = client.fault()?;
         }
         let rate_hz = self.rate_hz;
@@ -272,7 +273,7 @@ impl Watch {
         let path = gain.path.clone();
         match outcome {
             Ok(_) => gain.value = value,
-            // The draft goes back to what acts.
+            // The draft goes back to the settings in force.
             Err(_) => {
                 let revert = quadrant::link::message::SettingsRequest::Revert;
                 client.order(Body::Settings(revert))?;
@@ -287,7 +288,7 @@ impl Watch {
         self.say(outcome.map(|_| "capture armed".to_owned()))
     }
 
-    /// Tells an outcome; only a connection that is broken ends the watching.
+    /// Reports an outcome; only a connection that is broken ends the watching.
     fn say(&mut self, outcome: Result<String, ClientError>) -> anyhow::Result<()> {
         match outcome {
             Ok(done) => self.message = done,

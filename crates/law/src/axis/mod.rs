@@ -138,7 +138,7 @@ pub struct Axis<S: Scalar, const N: usize> {
 /// [`Done`](Self::Done).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Commissioning {
-    /// Nobody has commissioned the axis, and its law puts out nothing, whatever is measured.
+    /// Nobody has commissioned the axis, and its law puts out nothing.
     #[default]
     Inert,
     /// Nobody has commissioned the axis, but its law would drive it.
@@ -338,7 +338,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         self
     }
 
-    /// The load that the motor bears.
+    /// The load that the motor withstands.
     #[must_use]
     pub fn overload(self, overload: Overload) -> Self {
         self.axis.overload = overload;
@@ -532,9 +532,9 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
         self.oscillation.reading()
     }
 
-    /// Takes the speed of the spindle over.
-    pub(crate) fn tell_spindle(&mut self, speed: SpindleSpeed) {
-        self.cancelling.tell(speed);
+    /// Sets the speed of the spindle.
+    pub(crate) fn set_spindle_speed(&mut self, speed: SpindleSpeed) {
+        self.cancelling.set_speed(speed);
     }
 
     /// True while a motion is under way.
@@ -809,13 +809,13 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             }
         }
         let shown = state.shown();
-        let bears = self
+        let within_load = self
             .overload
             .step(&mut state.overload, state.telemetry.code.0);
         let stable = self.watch_oscillation(state);
         if !self.plausibility.step(&mut state.plausibility, shown) {
             Err(FaultCode::EncoderImplausible)
-        } else if !bears {
+        } else if !within_load {
             Err(FaultCode::Overload)
         } else if !stable {
             Err(FaultCode::Oscillation)
@@ -1246,7 +1246,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         self.put_out(state, output)
     }
 
-    /// Takes note of a stop; lets the friction model take over at the next start what the integral has moved by.
+    /// Takes note of a stop; at the next start the friction model adopts the integral's change since then.
     #[cold]
     #[inline(never)]
     fn set_off_or_stop(&self, state: &mut AxisState<S, N>, moves: bool) {

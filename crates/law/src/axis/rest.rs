@@ -2,11 +2,11 @@
 //!
 //! An axis that stands is held by its friction, so that its voltage is the friction's force. After a stop it creeps back into its
 //! place, by micrometres; the integral sees to it, and friction changes by as much as the integral does. The feedforward knows the
-//! reference alone, which stands. So when the reference sets off, the pre-sliding model takes over what the integral has moved by
+//! reference alone, which stands. So when the reference sets off, the pre-sliding model adopts the integral's change
 //! since the stop, and the integral gives it back: the output stays as it is, and the model begins with the friction of the axis.
 //!
 //! The integral keeps its voltage of the moment at which the reference stopped: an offset, gravity. A load that changes at rest
-//! cannot be told from friction by the encoder, and goes to the model, too, up to the breakaway level.
+//! cannot be distinguished from friction by the encoder, and goes to the model, too, up to the breakaway level.
 
 use crate::scalar::Scalar;
 

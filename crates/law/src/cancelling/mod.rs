@@ -18,11 +18,11 @@
 //!
 //! **Guard.** `p`, the sum of Re (G z), is the error that the vectors take away. Where the error goes against it, so that the mean of
 //! `-p (e + a p)` is above a floor, the vectors are too large: they are unlearnt much faster than they are learnt. `q`, the sum of Im (G z), is
-//! that error a quarter of a turn later. Where the mean of `q e` stays large beside that of `p^2`, the axis answers aside of G, and the vectors turn
-//! in place of falling: they are unlearnt as well.
+//! that error a quarter of a turn later. Where the mean of `q e` stays large beside that of `p^2`, the axis responds in quadrature to G, and the
+//! vectors turn in place of falling: they are unlearnt as well.
 //!
-//! **Slip.** The vector of the teeth turns against its own frequency where the spindle is not as fast as it is told. The speed
-//! follows that rotation, within 1.2 % of what was told.
+//! **Slip.** The vector of the teeth turns against its own frequency where the spindle is not as fast as its speed setting. The speed
+//! follows that rotation, within 1.2 % of the set speed.
 
 mod nodes;
 
@@ -43,48 +43,54 @@ const LEAK_S: f64 = 20.0;
 /// The same while nothing may be cancelled, s.
 const FADE_S: f64 = 0.1;
 
-/// Time of each of the guard's two means, s, or as many turns of the teeth's vector, if those take longer; time in which it unlearns, s;
-/// share by which the vectors may be too large; and the floor, mm RMS: below it stands what a reversal has in common with a
-/// vibration by chance.
+/// Time of each of the guard's two means, s, or as many turns of the teeth's vector, if those take longer.
 const GUARD_S: f64 = 0.03;
+/// Time of each of these means in turns of the teeth's vector.
 const GUARD_TURNS: f64 = 1.0;
+/// Time in which the guard unlearns the vectors, s.
 const UNLEARN_S: f64 = 0.04;
+/// Largest excess of the vectors over the vibration, as a share.
 const EXCESS: f64 = 0.06;
+/// Floor of the guard, mm RMS: a reversal may have less in common with a vibration by chance.
 const FLOOR_MM: f64 = 1e-3;
 
-/// The axis answers aside where the error that lies a quarter of a turn aside of what the vectors take away is so many times as large as that, and
-/// more than 60 degrees aside in all, by the cotangent: [`LEAST_MARGIN_DEG`] allows less. The time after which the vectors are unlearnt, s, and how many
-/// steps less a step counts that is not so: a speed that is told a per cent wrong, or a ramp, looks the same for a time.
-const ASIDE_TIMES: f64 = 3.0;
-const ASIDE_COTANGENT: f64 = 0.577;
+/// Least ratio of the error in quadrature to what the vectors take away, at which the axis responds in quadrature.
+const QUADRATURE_RATIO: f64 = 3.0;
+/// Cotangent of the least phase, 60 degrees, at which the axis responds in quadrature: [`LEAST_MARGIN_DEG`] allows less.
+const QUADRATURE_COTANGENT: f64 = 0.577;
 const _: () = assert!(
     LEAST_MARGIN_DEG == 30.0,
     "60 degrees are a right angle less this margin"
 );
-const ASIDE_S: f64 = 0.3;
-const NOT_ASIDE: u16 = 4;
+/// Time of a response in quadrature after which the vectors are unlearnt, s: a speed setting with an error of 1 %, or a ramp, looks
+/// the same for a time.
+const QUADRATURE_S: f64 = 0.3;
+/// Steps in quadrature that one step without it cancels.
+const IN_PHASE_STEPS: u16 = 4;
 
-/// Lengths are multiplied by so much, 1/mm, for the guard, and are a quarter of a millimetre at most.
-const PER_UNIT: f64 = 4.0;
+/// Factor from lengths to the guard's unit, 1/mm. The guard limits a length to a quarter of a millimetre.
+const UNITS_PER_MM: f64 = 4.0;
 
-/// Largest slip that is followed, right shifts of the speed that is told, which add up to 1.2 % of it.
+/// Largest slip that is followed, as right shifts of the set speed, which add up to 1.2 % of it.
 const SLIP_SHIFTS: (u32, u32) = (7, 8);
 
-/// Steps from one look at the rotation to the next; the time over which it is averaged, s; and the rate at which the slip follows
-/// it, a share of that at which the vector grows.
+/// Steps from one look at the rotation to the next.
 const LOOK_STEPS: u8 = 64;
+/// Time over which the rotation is averaged, s.
 const ROTATION_S: f64 = 0.15;
+/// Rate at which the slip follows the rotation, over the rate at which the vector grows.
 const SLIP_SHARE: f64 = 1.0 / 3.0;
 
-/// Rotations that are told apart, rad/s: each is twice the one before.
+/// Least rotation that is detected, rad/s.
 const LEAST_ROTATION: f64 = 0.25;
+/// Number of rotations that are distinguished: each is twice the one before.
 const ROTATIONS: usize = 7;
 
 /// A vector below this, or below the others, says nothing about the speed, V.
 const LEAST_V: f64 = 0.01;
 
-/// Factor of a growth, so that fixed point has room for its part across the vector.
-const GROWN: f64 = 256.0;
+/// Factor on a growth, so that fixed point has room for its part across the vector.
+const GROWTH_SCALE: f64 = 256.0;
 
 /// Units of a [`SpindleSpeed`] in a turn.
 const TURN: f64 = 4_294_967_296.0;
@@ -98,7 +104,7 @@ const TURN: f64 = 4_294_967_296.0;
 )]
 #[cfg_attr(feature = "settings", derive(miniconf::TreeSchema, miniconf::TreeAny))]
 pub struct CancellingSettings {
-    /// Speed of the spindle until the link tells another, rpm; 0 for one that stands.
+    /// Speed of the spindle until the link sets another, rpm; 0 for one that stands.
     pub spindle_rpm: f64,
     /// Largest rate at which a change of the speed is followed, rpm/s.
     pub ramp_rpm_s: f64,
@@ -196,10 +202,10 @@ struct Guard<S: Scalar> {
     share_of_turn: S::Gain,
     floor: S,
     unlearn: S,
-    aside_times: S::Gain,
-    aside_cotangent: S::Gain,
-    /// Steps that are counted at most while the axis answers aside: beyond half of them the vectors are unlearnt.
-    aside_steps: u16,
+    quadrature_ratio: S::Gain,
+    quadrature_cotangent: S::Gain,
+    /// Largest count of steps in which the axis responds in quadrature: beyond half of them the vectors are unlearnt.
+    quadrature_steps: u16,
 }
 
 /// The constants of the slip's follower.
@@ -238,9 +244,10 @@ pub struct CancellingState<S: Scalar> {
     voltage: S,
     slope: S,
     harmonics: [Harmonic<S>; HARMONICS],
-    /// Speed that is followed, and the one that was told over the link.
+    /// Speed that is followed.
     speed: u32,
-    told: Option<SpindleSpeed>,
+    /// Speed that was set over the link.
+    link_speed: Option<SpindleSpeed>,
     /// The next harmonic to be tuned to the speed, and harmonics that are to be.
     next: u8,
     stale: u8,
@@ -256,16 +263,16 @@ pub struct CancellingState<S: Scalar> {
     harm: S,
     /// The same two means of the error times the one that the vectors take away a quarter of a turn later; and the mean of the square of what they
     /// take away.
-    aside_now: S,
-    aside: S,
+    quadrature_now: S,
+    quadrature: S,
     size: S,
-    /// Steps in which the axis has answered aside, less [`NOT_ASIDE`] for each in which it has not.
-    aside_steps: u16,
+    /// Steps in which the axis has responded in quadrature, less [`IN_PHASE_STEPS`] for each in which it has not.
+    quadrature_steps: u16,
     /// Growth across the vector of the teeth since the last look; its mean, and that of the vector's square.
     across: S,
     rotation: S,
     square: S,
-    /// Deviation of the spindle's speed from the one that is told, 2^-32 turns in a step.
+    /// Deviation of the spindle's speed from the set one, 2^-32 turns in a step.
     slip: i32,
 }
 
@@ -314,13 +321,13 @@ impl<S: Scalar> Cancelling<S> {
             let parts = |value: [f64; 2]| value.map(|part| S::quantise(part, Quantity::Multiplier));
             *growth = found.map_or([S::ZERO; 2], |node| parts(node.growth));
             *response = found.map_or([S::ZERO; 2], |node| {
-                parts(node.response.map(|part| part * PER_UNIT))
+                parts(node.response.map(|part| part * UNITS_PER_MM))
             });
         }
         let number = |value| S::quantise(value, Quantity::Multiplier);
-        let floor = FLOOR_MM * PER_UNIT;
+        let floor = FLOOR_MM * UNITS_PER_MM;
         self.guard = Guard {
-            per_unit: S::gain(PER_UNIT, Quantity::Length, Quantity::Multiplier),
+            per_unit: S::gain(UNITS_PER_MM, Quantity::Length, Quantity::Multiplier),
             one: number(1.0),
             excess: fraction(EXCESS),
             share: fraction(-libm::expm1(-step_s / GUARD_S)),
@@ -331,22 +338,30 @@ impl<S: Scalar> Cancelling<S> {
             ),
             floor: number(floor * floor),
             unlearn: fraction(libm::exp(-step_s / UNLEARN_S)),
-            aside_times: S::gain(ASIDE_TIMES, Quantity::Multiplier, Quantity::Multiplier),
-            aside_cotangent: S::gain(ASIDE_COTANGENT, Quantity::Multiplier, Quantity::Multiplier),
+            quadrature_ratio: S::gain(QUADRATURE_RATIO, Quantity::Multiplier, Quantity::Multiplier),
+            quadrature_cotangent: S::gain(
+                QUADRATURE_COTANGENT,
+                Quantity::Multiplier,
+                Quantity::Multiplier,
+            ),
             // `as` saturates.
-            aside_steps: rounding::round(2.0 * ASIDE_S / step_s) as u16,
+            quadrature_steps: rounding::round(2.0 * QUADRATURE_S / step_s) as u16,
         };
         let look_s = step_s * f64::from(LOOK_STEPS);
         let per_volt = 1.0 / settings.limit_v.max(LEAST_V);
         // Growth times response, which it is multiplied by, is 2 rate Ts.
-        let turns = SLIP_SHARE * look_s * LEAST_ROTATION / (2.0 * PER_UNIT * TAU);
+        let turns = SLIP_SHARE * look_s * LEAST_ROTATION / (2.0 * UNITS_PER_MM * TAU);
         self.follower = Follower {
-            grown: S::gain(GROWN * per_volt, Quantity::Voltage, Quantity::Multiplier),
+            grown: S::gain(
+                GROWTH_SCALE * per_volt,
+                Quantity::Voltage,
+                Quantity::Multiplier,
+            ),
             per_volt: S::gain(per_volt, Quantity::Voltage, Quantity::Multiplier),
             share: fraction(-libm::expm1(-look_s / ROTATION_S)),
             least: S::quantise(LEAST_V * LEAST_V * per_volt, Quantity::Voltage),
-            rotation: number(LEAST_ROTATION * step_s * GROWN * f64::from(LOOK_STEPS)),
-            slow: number(settings.rate_per_s * step_s * PER_UNIT),
+            rotation: number(LEAST_ROTATION * step_s * GROWTH_SCALE * f64::from(LOOK_STEPS)),
+            slow: number(settings.rate_per_s * step_s * UNITS_PER_MM),
             change: S::gain(
                 turns * TURN / f64::from(self.multiples[0].max(1)),
                 Quantity::Multiplier,
@@ -386,11 +401,11 @@ impl<S: Scalar> Cancelling<S> {
         self.on
     }
 
-    /// Forgets all but the speed that was told: the axis is at rest.
+    /// Forgets all but the set speed: the axis is at rest.
     pub(crate) fn start(&self, state: &mut CancellingState<S>) {
         *state = CancellingState {
-            told: state.told,
-            speed: self.wanted(state),
+            link_speed: state.link_speed,
+            speed: self.speed_setting(state),
             stale: HARMONICS as u8,
             ..CancellingState::default()
         };
@@ -398,9 +413,9 @@ impl<S: Scalar> Cancelling<S> {
 
     /// The speed to be followed.
     #[inline(always)]
-    fn wanted(&self, state: &CancellingState<S>) -> u32 {
-        match state.told {
-            Some(SpindleSpeed(told)) => told,
+    fn speed_setting(&self, state: &CancellingState<S>) -> u32 {
+        match state.link_speed {
+            Some(SpindleSpeed(speed)) => speed,
             None => self.speed,
         }
     }
@@ -409,7 +424,7 @@ impl<S: Scalar> Cancelling<S> {
     #[inline(always)]
     pub(crate) fn step(&self, state: &mut CancellingState<S>, error: S, cut: Cut) {
         let fading = cut == Cut::Idle;
-        if state.speed != self.wanted(state) || state.fading != fading {
+        if state.speed != self.speed_setting(state) || state.fading != fading {
             self.follow(state, fading);
         }
         if state.stale > 0 {
@@ -448,7 +463,7 @@ impl<S: Scalar> Cancelling<S> {
         }
     }
 
-    /// Weighs the error against what the vectors take away, and unlearns vectors that are too large, or that the axis answers aside.
+    /// Weighs the error against what the vectors take away, and unlearns vectors that are too large, or to which the axis responds in quadrature.
     #[inline(always)]
     fn weigh(&self, state: &mut CancellingState<S>, error: S) {
         let guard = &self.guard;
@@ -468,19 +483,22 @@ impl<S: Scalar> Cancelling<S> {
         let mean = |mean: S, new: S| mean + (new - mean).times(state.share, Quantity::Fraction);
         state.harm_now = mean(state.harm_now, -product(taken, allowed));
         state.harm = mean(state.harm, state.harm_now);
-        state.aside_now = mean(state.aside_now, product(later, error));
-        state.aside = mean(state.aside, state.aside_now);
+        state.quadrature_now = mean(state.quadrature_now, product(later, error));
+        state.quadrature = mean(state.quadrature, state.quadrature_now);
         state.size = mean(state.size, product(taken, taken));
-        let aside = state.aside.magnitude();
-        let is_aside = (aside > guard.floor)
-            & (aside > state.size.scale(guard.aside_times))
-            & (aside.scale(guard.aside_cotangent) + state.harm > S::ZERO);
-        state.aside_steps = if is_aside {
-            state.aside_steps.saturating_add(1).min(guard.aside_steps)
+        let quadrature = state.quadrature.magnitude();
+        let responds_in_quadrature = (quadrature > guard.floor)
+            & (quadrature > state.size.scale(guard.quadrature_ratio))
+            & (quadrature.scale(guard.quadrature_cotangent) + state.harm > S::ZERO);
+        state.quadrature_steps = if responds_in_quadrature {
+            state
+                .quadrature_steps
+                .saturating_add(1)
+                .min(guard.quadrature_steps)
         } else {
-            state.aside_steps.saturating_sub(NOT_ASIDE)
+            state.quadrature_steps.saturating_sub(IN_PHASE_STEPS)
         };
-        if state.harm > guard.floor || state.aside_steps > guard.aside_steps / 2 {
+        if state.harm > guard.floor || state.quadrature_steps > guard.quadrature_steps / 2 {
             for harmonic in &mut state.harmonics {
                 let unlearnt = |part: S| part.times(guard.unlearn, Quantity::Fraction);
                 harmonic.vector = harmonic.vector.map(unlearnt);
@@ -528,8 +546,8 @@ impl<S: Scalar> Cancelling<S> {
         if change == 0 {
             return;
         }
-        let told = self.wanted(state);
-        let most = ((told >> SLIP_SHIFTS.0) + (told >> SLIP_SHIFTS.1)) as i32;
+        let set = self.speed_setting(state);
+        let most = ((set >> SLIP_SHIFTS.0) + (set >> SLIP_SHIFTS.1)) as i32;
         let slip = if state.rotation > S::ZERO {
             state.slip.saturating_add(change)
         } else {
@@ -553,17 +571,17 @@ impl<S: Scalar> Cancelling<S> {
         state.voltage - state.slope - state.slope
     }
 
-    /// Takes a step towards the wanted speed.
+    /// Takes a step towards the set speed.
     #[cold]
     #[inline(never)]
     fn follow(&self, state: &mut CancellingState<S>, fading: bool) {
-        let wanted = self.wanted(state);
+        let set_speed = self.speed_setting(state);
         let now = state.speed;
-        if now != wanted {
+        if now != set_speed {
             state.slip = 0;
         }
-        let by = now.abs_diff(wanted).min(self.ramp);
-        state.speed = if wanted > now {
+        let by = now.abs_diff(set_speed).min(self.ramp);
+        state.speed = if set_speed > now {
             now.saturating_add(by)
         } else {
             now.saturating_sub(by)
@@ -627,9 +645,9 @@ impl<S: Scalar> Cancelling<S> {
 }
 
 impl<S: Scalar> CancellingState<S> {
-    /// Takes the speed of the spindle over.
-    pub(crate) fn tell(&mut self, speed: SpindleSpeed) {
-        self.told = Some(speed);
+    /// Sets the speed of the spindle.
+    pub(crate) fn set_speed(&mut self, speed: SpindleSpeed) {
+        self.link_speed = Some(speed);
     }
 
     /// Takes note that the output is at its limit.

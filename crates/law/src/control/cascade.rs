@@ -8,7 +8,7 @@
 //! v is the measured velocity, `v_ref - de/dt` with a filtered rate. With full velocity feedforward (g = 1) and within
 //! the limit, w is `Kv e + de/dt` and the cascade is a PID with real zeros; with less, the axis lags by
 //! `(1 - g) v_ref / Kv`, or until the integral has taken it up. What is its own is the limit on the velocity it asks for:
-//! a large error is driven back at that speed, whatever the gains.
+//! a large error is driven back at that speed, independent of the gains.
 //! Source: Gross, Hamann and Wiegärtner, *Electrical Feed Drives in Automation*, Publicis, 2001.
 
 use super::surface::{SurfaceGains, SurfaceLoop};
@@ -96,8 +96,8 @@ impl<S: Scalar> Cascade<S> {
         limit: S,
     ) -> FeedbackTerms<S> {
         let error = self.inner.rate.clip(input.error);
-        let wanted = error.scale(self.position) + input.velocity.scale(self.feedforward);
-        let set = wanted.within(self.limit);
+        let requested = error.scale(self.position) + input.velocity.scale(self.feedforward);
+        let set = requested.within(self.limit);
         let proportional = (set - input.velocity).scale(self.velocity);
         let derivative = self.inner.rate.step(state, error);
         self.inner

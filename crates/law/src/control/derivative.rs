@@ -50,7 +50,7 @@ impl<S: Scalar> Derivative<S> {
         };
     }
 
-    /// Takes over the memory of another law: the next step, from the error given, leaves the derivative as it is.
+    /// Adopts the memory of another law: the next step, from the error given, leaves the derivative as it is.
     #[inline(always)]
     pub(super) fn take_over(&self, state: &mut FeedbackState<S>, error: S) {
         state.last_error = self.clip(error) - state.derivative.scale(self.steady_change);

@@ -94,7 +94,7 @@ impl<S: Scalar> Feedback<S> {
         matches!(self, Self::Scheduled(_) | Self::Cascade(_))
     }
 
-    /// Takes over the memory of another law, or of this one with other gains: the next step, from the error given (mm),
+    /// Adopts the memory of another law, or of this one with other gains: the next step, from the error given (mm),
     /// leaves the derivative as it is, and the integral goes on from its volts.
     pub fn take_over(&self, state: &mut FeedbackState<S>, error: S) {
         match self {

@@ -37,24 +37,24 @@ impl<S: Scalar> Integrator<S> {
         let fast = proportional + derivative;
         let sum = driver.accumulate(state.integral, self.per_tick);
         let integral = S::total(sum);
-        let wanted = fast + integral;
+        let requested = fast + integral;
         // Most ticks: neither the output nor the integral is at a bound. Not so if either is not a number.
-        if (wanted + base).is_within(limit) && integral.is_within(self.limit) {
+        if (requested + base).is_within(limit) && integral.is_within(self.limit) {
             state.integral = sum;
             return FeedbackTerms {
                 proportional,
                 integral,
                 derivative,
-                output: wanted,
+                output: requested,
                 saturated: false,
             };
         }
         cold_path();
         let (low, high) = (-limit - base, limit - base);
-        let outward = if wanted > high {
+        let outward = if requested > high {
             driver > S::ZERO
         } else {
-            wanted < low && driver < S::ZERO
+            requested < low && driver < S::ZERO
         };
         let integral = if outward {
             S::total(state.integral)
@@ -67,14 +67,14 @@ impl<S: Scalar> Integrator<S> {
             };
             bounded
         };
-        let wanted = fast + integral;
-        let output = wanted.limit(low, high);
+        let requested = fast + integral;
+        let output = requested.limit(low, high);
         FeedbackTerms {
             proportional,
             integral,
             derivative,
             output,
-            saturated: output != wanted,
+            saturated: output != requested,
         }
     }
 }

@@ -4,7 +4,7 @@
 //! w = lambda e + de/dt        u = K sat(w / phi) + r int(K sat(w / phi))
 //! ```
 //!
-//! Beyond the boundary layer, `|w| > phi`, the output is the full K, which holds against any disturbance below K; within
+//! Beyond the boundary layer, `|w| > phi`, the output is the full K, which holds any disturbance below K; within
 //! it the law is a PI on w with the gain K / phi, a PID with real zeros. A thin layer is precise and chatters: encoder
 //! noise and the dead time of the plant decide how thin it may be. The integral, if any, acts on the saturated surface,
 //! so that it cannot wind up on a large error.
@@ -72,8 +72,8 @@ impl<S: Scalar> SlidingMode<S> {
         }
     }
 
-    /// One control period; output and `base` together stay within +-`limit`, all in V. The saturated surface is
-    /// told as the proportional term.
+    /// One control period; output and `base` together stay within +-`limit`, all in V. The saturated surface
+    /// is reported as the proportional term.
     #[inline(always)]
     pub fn step(
         &self,

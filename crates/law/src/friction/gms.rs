@@ -117,7 +117,7 @@ pub struct GmsState<S: Scalar, const N: usize> {
     sum: S,
     /// Share that is left of the distances in `forces` while all slip, a [`Quantity::Fraction`].
     left: S,
-    /// A bit for each element that slips, and [`BACKWARD`] after a motion towards smaller positions: one comparison tells that
+    /// A bit for each element that slips, and [`BACKWARD`] after a motion towards smaller positions: one comparison shows that
     /// all go on slipping. [`BRISTLES`] after a model of bristles: their force is to be spread.
     slipping: u32,
 }

@@ -41,14 +41,14 @@ const TABLE_TOLERANCE: f64 = 2.5e-4;
 
 /// The velocity at which the tables end, mm/s.
 fn table_end_mm_s(curve: &StribeckCurve, stiffness_v_per_mm: f64, step_s: f64) -> f64 {
-    let wanted = LARGEST_STEP * curve.coulomb_v / (stiffness_v_per_mm * step_s);
-    let wanted = wanted.min(FASTEST_MM_S);
+    let needed = LARGEST_STEP * curve.coulomb_v / (stiffness_v_per_mm * step_s);
+    let needed = needed.min(FASTEST_MM_S);
     let tolerance_v = TABLE_TOLERANCE * curve.breakaway_v;
     let mut end = curve.flat_velocity_mm_s();
     // Doublings from a thousandth of a mm/s, the smallest Vs, to the fastest motion are twenty.
     for _ in 0..20 {
         let longer = 2.0 * end;
-        if longer > wanted
+        if longer > needed
             || interpolation_error(longer, f64::MAX, |v| curve.level_v(v)) > tolerance_v
         {
             break;

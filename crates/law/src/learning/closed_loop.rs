@@ -9,15 +9,17 @@ use crate::control::pid::PidGains;
 use crate::control::plant_model::PlantModel;
 use crate::scalar::{Quantity, Scalar};
 
-/// Inputs that are remembered; a power of two.
-const ROOM: usize = 8;
+/// Number of inputs that are remembered; a power of two.
+const REMEMBERED_INPUTS: usize = 8;
 
 /// Longest dead time of the plant that fits, control periods.
 pub const MAX_DELAY_TICKS: usize = 28;
 
-/// Largest position and velocity of the model, mm and mm/s, and largest input, V: within every number type.
+/// Largest position of the model, mm: within every number type.
 const MOST_MM: f64 = 31.0;
+/// Largest velocity of the model, mm/s: within every number type.
 const MOST_MM_S: f64 = 2000.0;
+/// Largest input of the model, V: within every number type.
 const MOST_V: f64 = 31.0;
 
 /// The loop ready for the tick.
@@ -46,7 +48,7 @@ pub(super) struct ClosedLoopState<S: Scalar> {
     velocity: S,
     derivative: S,
     integral: S::Sum,
-    inputs: [S; ROOM],
+    inputs: [S; REMEMBERED_INPUTS],
     place: usize,
 }
 
@@ -62,7 +64,7 @@ impl<S: Scalar> ClosedLoop<S> {
         };
         let filter = libm::exp(-step_s / gains.derivative_filter_s);
         let delay_s = plant.delay_s - 0.5 * (step_s - period_s);
-        let delay = (delay_s / step_s).clamp(0.0, (ROOM - 2) as f64);
+        let delay = (delay_s / step_s).clamp(0.0, (REMEMBERED_INPUTS - 2) as f64);
         Self {
             proportional: S::gain(gains.kp_v_per_mm, Quantity::Length, Quantity::Voltage),
             integral: S::gain(
@@ -104,7 +106,7 @@ impl<S: Scalar> ClosedLoop<S> {
         S::total(state.integral)
     }
 
-    /// Lets the integral hold against `voltage` more from now on, V: the position does not change by it.
+    /// Adds `voltage` to what the integral holds, V: the position does not change by it.
     #[inline(always)]
     pub(super) fn hold_against(state: &mut ClosedLoopState<S>, voltage: S) {
         state.integral = (S::total(state.integral) + voltage).into_sum();
@@ -134,9 +136,9 @@ impl<S: Scalar> ClosedLoop<S> {
             - S::total(state.integral)
             - state.derivative;
         let place = state.place;
-        state.inputs[place % ROOM] = input.within(most_v);
+        state.inputs[place % REMEMBERED_INPUTS] = input.within(most_v);
         state.place = place.wrapping_add(1);
-        let at = |steps: usize| state.inputs[place.wrapping_sub(steps) % ROOM];
+        let at = |steps: usize| state.inputs[place.wrapping_sub(steps) % REMEMBERED_INPUTS];
         let (late, later) = (at(self.delay), at(self.delay + 1));
         let arriving = late + (later - late).times(self.rest, Quantity::Fraction);
         let velocity = state.velocity.times(self.keep, Quantity::Fraction)

@@ -14,8 +14,8 @@
 //! **Cut.** Under a vibration the scale also makes up for what the gate takes away, so that there are two of them: what is
 //! learnt while the gate is closed holds while it is closed.
 //!
-//! **Change.** What the last seconds say is held against all that is remembered. Where their scales differ by more than
-//! a tenth while nothing vibrates, the axis has changed, and the rest is forgotten: one reversal then counts for all.
+//! **Change.** What the last seconds show is compared with all that is remembered. Where their scales differ by more than
+//! 10 % while nothing vibrates, the axis has changed, and the rest is forgotten: one reversal then counts for all.
 //!
 //! **Guard.** The mean squares of `e` and of `e0` over the last seconds are compared. When the error with feedforward is the
 //! larger one, the scale falls at a fixed rate towards zero, and what was learnt before is forgotten.
@@ -77,33 +77,35 @@ pub struct LearningLoop<'a> {
     pub resolution_mm: f64,
 }
 
-/// Bounds of one over the scale: below a quarter, a scale takes over less than it could.
+/// Bounds of one over the scale: below a quarter, a scale adopts less than it could.
 const INVERSES: (f64, f64) = (1.0 / MOST_SCALE, 4.0);
 
 /// Control periods from one look at the axis to the next.
 const LOOK_TICKS: u32 = 4;
 
-/// Longest step of the model, s, and over the time in which the loop answers; and most looks in a step.
+/// Longest step of the model, s.
 const STEP_S: f64 = 1.2e-3;
+/// Longest step of the model over the time in which the loop answers.
 const STEP_SHARE: f64 = 1.0;
+/// Most looks in a step.
 const MOST_LOOKS: f64 = 4.0;
 
 /// Length of a block, s, as nearly as whole steps allow: the scale moves once a block.
 const BLOCK_S: f64 = 12.8e-3;
 
 /// Unit of errors, as a multiple of breakaway over Kp: half of what a reversal without feedforward leaves.
-const UNIT: f64 = 4.0;
+const ERROR_UNIT: f64 = 4.0;
 
 /// Largest `sum(psi^2)` times time, in units: what was learnt before is halved beyond it.
 const MOST_INFORMATION: f64 = 0.07;
 
-/// Difference of the scale by the last seconds from the present one beyond which the axis has changed; and the information that they
-/// need to say so, as a share of all that is remembered.
-const DIFFERS: f64 = 0.1;
-const TELLING: f64 = 0.25;
+/// Least difference of the scale by the last seconds from the present one that shows a change of the axis.
+const MIN_CHANGE: f64 = 0.1;
+/// Least information of the last seconds that shows a change, as a share of all that is remembered.
+const MIN_CHANGE_INFORMATION: f64 = 0.25;
 
 /// Rate of the scale down the slope, 1/s, per unit of information.
-const RATE: f64 = 500.0;
+const SLOPE_RATE: f64 = 500.0;
 
 /// Time constant of the pull to 1, s.
 const PULL_S: f64 = 600.0;
@@ -117,12 +119,14 @@ const FADE_PER_S: f64 = 1.0;
 /// The last seconds, for the guard and for what shows a change: time constant, s.
 const GUARD_S: f64 = 2.0;
 
-/// Excess of the error over that without feedforward that the guard allows: a share of its mean square, and counts.
+/// Excess of the error over that without feedforward that the guard allows, as a share of its mean square.
 const GUARD_SHARE: f64 = 0.05;
+/// The same excess in counts.
 const GUARD_COUNTS: f64 = 0.5;
 
-/// Gate below which it is closed, and blocks, half a second, after which an open gate ends a cut.
-const SHAKEN: f64 = 0.9;
+/// Gate below which it is closed.
+const CLOSED_GATE: f64 = 0.9;
+/// Blocks, half a second, after which an open gate ends a cut.
 const QUIET_BLOCKS: u8 = 40;
 
 /// Time for which nothing is learnt after the model and the axis may have parted, s.
@@ -197,7 +201,7 @@ struct Estimate<S: Scalar> {
     guard_share: S::Gain,
     guard_least: S,
     differs: S::Gain,
-    telling: S::Gain,
+    change_information: S::Gain,
     /// The gate less 1 below which the axis is shaken.
     shaken: S,
 }
@@ -306,7 +310,7 @@ impl<S: Scalar> Learning<S> {
         let step_s = look_s * looks;
         let block_steps = rounding::round(BLOCK_S / step_s).clamp(1.0, f64::from(u8::MAX));
         let block_s = step_s * block_steps;
-        let unit_mm = UNIT * axis.breakaway_v / axis.pid.kp_v_per_mm.max(1e-9);
+        let unit_mm = ERROR_UNIT * axis.breakaway_v / axis.pid.kp_v_per_mm.max(1e-9);
         let count = GUARD_COUNTS * axis.resolution_mm / unit_mm;
         let number = |value| S::quantise(value, Quantity::Multiplier);
         let share = |value| S::gain(value, Quantity::Multiplier, Quantity::Multiplier);
@@ -341,15 +345,15 @@ impl<S: Scalar> Learning<S> {
                 keep: fraction(libm::exp(-block_s / settings.memory_s)),
                 guard_keep: fraction(libm::exp(-block_s / GUARD_S)),
                 most_information: number(MOST_INFORMATION),
-                rate: share(RATE * block_s),
-                pull: share(1.0 / (RATE * PULL_S)),
+                rate: share(SLOPE_RATE * block_s),
+                pull: share(1.0 / (SLOPE_RATE * PULL_S)),
                 most_change: number(MOST_PER_S * block_s),
                 fade: number(FADE_PER_S * block_s),
                 guard_share: share(GUARD_SHARE),
-                differs: share(DIFFERS),
-                telling: share(TELLING),
+                differs: share(MIN_CHANGE),
+                change_information: share(MIN_CHANGE_INFORMATION),
                 guard_least: number(GUARD_S * count * count),
-                shaken: number(SHAKEN - 1.0),
+                shaken: number(CLOSED_GATE - 1.0),
             },
         }
     }
@@ -443,7 +447,7 @@ impl<S: Scalar> Learning<S> {
     /// Looks at the tracking error, mm; returns true if a step is due.
     #[inline(always)]
     pub(crate) fn look(&self, state: &mut LearningState<S>, error: S) -> bool {
-        state.gate.hear(error);
+        state.gate.add_error(error);
         state.looks += 1;
         let due = state.looks >= self.looks;
         if due {
@@ -579,9 +583,9 @@ impl<S: Scalar> Learning<S> {
         state.lately = lately;
         let fit = &mut sums.fit;
         *fit = add_fit(*fit, keep);
-        let telling = lately.information > fit.information.scale(estimate.telling);
+        let informed = lately.information > fit.information.scale(estimate.change_information);
         let differs = lately.slope(scale).magnitude() > lately.information.scale(estimate.differs);
-        if telling & differs & !state.shaken {
+        if informed & differs & !state.shaken {
             *fit = lately;
         }
         if fit.information > estimate.most_information {

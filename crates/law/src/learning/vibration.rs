@@ -17,16 +17,17 @@ const MEAN_S: f64 = 0.05;
 /// Time constant of the gate at rest, s; under vibration it is quicker.
 const GATE_S: f64 = 0.02;
 
-/// Noise of the encoder that is no vibration, RMS, counts: its quantisation is 0.29. And the share of its power that the
-/// threshold lies at.
+/// Noise of the encoder that is no vibration, RMS, counts: its quantisation is 0.29.
 const NOISE_COUNTS: f64 = 0.5;
+/// Threshold over the power of this noise.
 const NOISE_MARGIN: f64 = 2.0;
 
-/// Vibration that is none yet, as a share of the amplitude that halves: reversals shake the axis a little, too.
-const QUIET: f64 = 0.5;
+/// Largest amplitude that does not close the gate, over the amplitude that halves it: reversals shake the axis a little, too.
+const QUIET_SHARE: f64 = 0.5;
 
-/// Largest velocity and square of the amplitude over that of the half gate that count: they bound the step of the gate.
+/// Largest velocity that counts, over that of the half gate: it bounds the step of the gate.
 const MOST_VELOCITY: f64 = 5.0;
+/// Largest square of the amplitude that counts, over that of the half gate.
 const MOST_POWER: f64 = 20.0;
 
 /// The gate ready for the tick.
@@ -46,9 +47,10 @@ pub(super) struct Gate<S: Scalar> {
 /// The memory of the gate.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct GateState<S: Scalar> {
-    /// Sums of the errors of a step: of this one so far, and of the last.
-    heard: S,
-    heard_before: S,
+    /// Sum of the errors of this step so far.
+    sum: S,
+    /// Sum of the errors of the last step.
+    sum_before: S,
     low: S,
     slow: S,
     power: S,
@@ -81,19 +83,19 @@ impl<S: Scalar> Gate<S> {
             high: share(1.0 - slow),
             keep: fraction(mean),
             take: share(2.0 * (1.0 - mean)),
-            threshold: number((NOISE_MARGIN * noise).clamp(QUIET * QUIET, MOST_POWER)),
+            threshold: number((NOISE_MARGIN * noise).clamp(QUIET_SHARE * QUIET_SHARE, MOST_POWER)),
             share: share((step_s / GATE_S).min(1.0 / (1.0 + MOST_POWER))),
             most: (number(MOST_VELOCITY), number(MOST_POWER)),
         }
     }
 
-    /// One step with the errors that were heard since the last; returns by how much the gate has changed.
+    /// One step with the errors since the last; returns by how much the gate has changed.
     #[inline(always)]
     pub(super) fn step(&self, state: &mut GateState<S>) -> S {
         let (most_velocity, most_power) = self.most;
-        let heard = core::mem::replace(&mut state.heard, S::ZERO);
-        let moved = heard - state.heard_before;
-        state.heard_before = heard;
+        let sum = core::mem::replace(&mut state.sum, S::ZERO);
+        let moved = sum - state.sum_before;
+        state.sum_before = sum;
         let low = state.low.times(self.low, Quantity::Fraction) + moved.scale(self.velocity);
         state.low = low.within(most_velocity);
         let band = state.low - state.slow;
@@ -101,9 +103,9 @@ impl<S: Scalar> Gate<S> {
         let square = band.times(band, Quantity::Multiplier);
         state.power = state.power.times(self.keep, Quantity::Fraction) + square.scale(self.take);
         let beyond = (state.power - self.threshold).limit(S::ZERO, most_power);
-        let wanted = state.deviation.times(beyond, Quantity::Multiplier) + beyond;
+        let target = state.deviation.times(beyond, Quantity::Multiplier) + beyond;
         let before = state.deviation;
-        state.deviation = before - (before + wanted).scale(self.share);
+        state.deviation = before - (before + target).scale(self.share);
         state.deviation - before
     }
 }
@@ -111,8 +113,8 @@ impl<S: Scalar> Gate<S> {
 impl<S: Scalar> GateState<S> {
     /// Takes a tracking error of the next step, mm.
     #[inline(always)]
-    pub(super) fn hear(&mut self, error: S) {
-        self.heard = self.heard + error;
+    pub(super) fn add_error(&mut self, error: S) {
+        self.sum = self.sum + error;
     }
 
     /// The gate less 1, within -1 to 0, a [`Quantity::Multiplier`].

@@ -26,7 +26,7 @@ pub struct HarmonicSettings {
     pub frequency_hz: f64,
     /// Phase at which the full-speed cycles begin, rad. The centre is where the start puts it.
     pub phase_rad: f64,
-    /// Cycles at full speed; `None` goes on for ever.
+    /// Cycles at full speed; `None` goes on indefinitely.
     pub cycles: Option<f64>,
     /// Duration of the lead-in and of the lead-out, s.
     pub lead_s: f64,

@@ -60,8 +60,9 @@ impl PointToPointSettings {
 
 /// Fraction bits of the sums beyond those of a [`Position`].
 pub(super) const FRACTION_BITS: u32 = 64;
-/// Bits dropped from the sums before they become a velocity and an acceleration.
+/// Bits dropped from a sum before it becomes a velocity.
 const VELOCITY_SHIFT: u32 = 52;
+/// Bits dropped from a sum before it becomes an acceleration.
 const ACCELERATION_SHIFT: u32 = 48;
 
 /// A move ready for the tick.

@@ -1,5 +1,5 @@
 //! A velocity that is brought to a target within limits of acceleration and jerk: jogging, searching for a switch, and
-//! stopping from whatever motion is under way.
+//! stopping from any motion under way.
 //!
 //! Acceleration moves on a lattice, whole multiples of the jerk per tick. Bringing it from level `k` back to zero
 //! then changes the velocity by exactly `T(k - 1)`, with `T(k) = J k (k + 1) / 2`, so that comparisons of integers
@@ -14,13 +14,14 @@ use crate::units::{POSITION_UNITS_PER_COUNT, Position};
 
 /// Fraction bits of a [`Velocity`].
 const FRACTION_BITS: u32 = 32;
-/// Fraction bits that remain when a velocity and an acceleration become numbers.
+/// Fraction bits that remain when a velocity becomes a number.
 const VELOCITY_BITS: u32 = 8;
+/// Fraction bits that remain when an acceleration becomes a number.
 const ACCELERATION_BITS: u32 = 16;
-/// No velocity is larger: then no difference of two, and no sum with what braking needs, overflows.
-const LARGEST: i64 = 1 << 61;
+/// Largest velocity: no difference of two, and no sum with what braking needs, overflows.
+const MAX_VELOCITY: i64 = 1 << 61;
 
-/// A displacement per tick in 2^-32 of a [`Position`] unit, so that no velocity a machine can tell apart is rounded
+/// A displacement per tick in 2^-32 of a [`Position`] unit, so that no velocity that a machine can distinguish is rounded
 /// away; at most +-2^29 units (8192 counts) in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Velocity(i64);
@@ -59,10 +60,10 @@ impl Velocity {
 
     #[inline(always)]
     const fn clamped(value: i64) -> Self {
-        if value > LARGEST {
-            Self(LARGEST)
-        } else if value < -LARGEST {
-            Self(-LARGEST)
+        if value > MAX_VELOCITY {
+            Self(MAX_VELOCITY)
+        } else if value < -MAX_VELOCITY {
+            Self(-MAX_VELOCITY)
         } else {
             Self(value)
         }
@@ -127,7 +128,7 @@ impl RampState {
         }
     }
 
-    /// A ramp that takes over from another motion, `displacement` being its last tick's. The acceleration is taken to be
+    /// A ramp that continues another motion, `displacement` being its last tick's. The acceleration is taken to be
     /// zero; [`Ramp::take_over`] keeps it.
     #[inline(always)]
     pub(crate) const fn from_motion(position: Position, displacement: Position) -> Self {
@@ -164,10 +165,10 @@ impl<S: Scalar> Ramp<S> {
         let rate = scale.rate_hz;
         let acceleration = acceleration_mm_s2 * steps_per_mm(scale) / (rate * rate);
         let jerk = jerk_mm_s3 * steps_per_mm(scale) / (rate * rate * rate);
-        let jerk = rounding::clamp(jerk.min(acceleration), 1.0, LARGEST as f64);
+        let jerk = rounding::clamp(jerk.min(acceleration), 1.0, MAX_VELOCITY as f64);
         let jerk = rounding::floor(jerk);
         // T(levels) stays below the largest velocity.
-        let most = libm::sqrt(LARGEST as f64 / jerk).min(f64::from(i32::MAX));
+        let most = libm::sqrt(MAX_VELOCITY as f64 / jerk).min(f64::from(i32::MAX));
         let levels = rounding::clamp(rounding::floor(acceleration / jerk), 1.0, most.max(1.0));
         let unit_mm = scale.resolution_mm / POSITION_UNITS_PER_COUNT;
         let one = libm::scalbn(1.0, FRACTION_BITS as i32);
@@ -189,7 +190,7 @@ impl<S: Scalar> Ramp<S> {
         }
     }
 
-    /// A ramp that takes over from another motion to stop it: `displacement` is its last tick's, `before` that of the tick
+    /// A ramp that continues another motion to stop it: `displacement` is its last tick's, `before` that of the tick
     /// before. An acceleration that already slows it down is kept, cut to the ramp's limit; one that still speeds it up
     /// is dropped at once, so that the stop stays within [`Ramp::stopping_distance`].
     pub fn take_over(
@@ -236,22 +237,26 @@ impl<S: Scalar> Ramp<S> {
         let missing = target.0 - state.velocity.0;
         let backward = missing < 0;
         // Seen from the side on which the velocity has to rise.
-        let wanted = missing.unsigned_abs() as i64;
+        let needed_units = missing.unsigned_abs() as i64;
         let before = self.level(state);
         let before = if backward { -before } else { before };
         let (level, may_land) = if before < 0 {
             (before + 1, false)
         } else if state.landed {
             (before, false)
-        } else if before < self.levels && wanted >= self.needed(before + 1) {
+        } else if before < self.levels && needed_units >= self.needed(before + 1) {
             (before + 1, false)
-        } else if wanted >= self.needed(before) {
+        } else if needed_units >= self.needed(before) {
             (before, true)
         } else {
             (before - 1, true)
         };
         // What remains at level zero is less than one multiple.
-        let landing = if may_land && level == 0 { wanted } else { 0 };
+        let landing = if may_land && level == 0 {
+            needed_units
+        } else {
+            0
+        };
         let change = i64::from(level) * self.jerk + landing;
         let change = if backward { -change } else { change };
         state.level = if backward { -level } else { level };

@@ -9,8 +9,9 @@ use super::sample::{MotionScale, ReferenceSample};
 use crate::scalar::{Quantity, Scalar};
 use crate::units::{POSITION_UNITS_PER_COUNT, Position};
 
-/// Bits dropped from the differences before they become a velocity and an acceleration.
+/// Bits dropped from a difference before it becomes a velocity.
 const VELOCITY_SHIFT: u32 = 56;
+/// Bits dropped from a difference before it becomes an acceleration.
 const ACCELERATION_SHIFT: u32 = 48;
 
 /// The way of one axis from one set point to the next.
@@ -20,7 +21,7 @@ pub struct Segment {
     pub start: Position,
     /// The forward differences of the position at the start, first to fifth.
     pub differences: [i128; 5],
-    /// Ticks left of it; at least one when it is handed over.
+    /// Ticks left of it; at least one when the axis receives it.
     pub ticks: u32,
     /// It begins a stream.
     pub first: bool,

@@ -3,7 +3,7 @@
 //! ```text
 //!   Applied --enabled--> Releasing --release time--> Released --Disable, or the end of a stop--> Applying --apply time--> off
 //!      ^                                                                                                        |
-//!      +------------- outputs off, for whatever reason and in the same tick <-----------------------------------+
+//!      +------------- outputs off, for any reason and in the same tick <---------------------------------------+
 //! ```
 //!
 //! The law holds the axes while the brake moves, so that a hanging axis does not fall between brake and law. No motion

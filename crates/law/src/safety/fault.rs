@@ -77,7 +77,7 @@ pub enum FaultCode {
     HomeSwitchStuck = 23,
     /// Homing did not find the index pulse.
     IndexMissing = 24,
-    /// The home switch lets go too near an index pulse to tell which of them follows.
+    /// The home switch lets go too near an index pulse to decide which of them follows.
     IndexNearSwitch = 25,
     /// The next value of an injected voltage did not come in time.
     InjectionUnderrun = 26,
@@ -87,7 +87,7 @@ pub enum FaultCode {
     EncoderImplausible = 28,
     /// A controlled stop lasted longer than its limits allow.
     StopOverrun = 29,
-    /// The motor was loaded for longer than it bears.
+    /// The motor was loaded for longer than it withstands.
     Overload = 30,
     /// The axis swung to and fro by itself.
     Oscillation = 31,

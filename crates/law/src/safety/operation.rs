@@ -35,7 +35,7 @@ pub enum EnabledBy {
 }
 
 impl EnabledBy {
-    /// True if a command to enable is heeded from there.
+    /// True if a command to enable is acted on from there.
     pub const fn allows(self, station: Station) -> bool {
         match self {
             Self::Any => true,

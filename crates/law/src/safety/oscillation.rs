@@ -18,8 +18,8 @@
 use crate::rounding;
 use crate::scalar::{Quantity, Scalar};
 
-/// Steps in which the friction feedforward is reduced to nothing.
-const STEPS: u8 = 100;
+/// Number of steps in which the friction feedforward is reduced to nothing.
+const REDUCTION_STEPS: u8 = 100;
 /// Time for all of them, s.
 const REDUCING_S: f64 = 0.05;
 /// Time for the way back, s.
@@ -30,14 +30,15 @@ const AWAY_S: f64 = 5.0;
 /// Time after which the next trial may be made, s.
 const PATIENCE_S: f64 = 60.0;
 
-/// Strokes for which it stays away, and times [`AWAY_S`] after which it comes back without them.
+/// Strokes for which the friction feedforward stays off.
 const AWAY_STROKES: u8 = 8;
+/// Multiple of [`AWAY_S`] after which it returns without these strokes.
 const MOST_AWAY: u32 = 4;
 
-/// Longest stroke of a trial, s: a motion that has ended tells nothing.
+/// Longest stroke of a trial, s: a motion that has ended shows nothing.
 const TRIAL_S: f64 = 5.0;
 
-/// Window in which an oscillation is even, s; and time of rest before it counts as hum.
+/// Window in which an oscillation is even, and time of rest before it counts as hum, s.
 const WINDOW_S: f64 = 1.0;
 
 /// Strokes one after the other at whose ends the error has swung too far, in them or from the one to the other.
@@ -55,8 +56,9 @@ const LEAST_HARM: u32 = 16;
 /// Least way back of the error that ends a swing, counts.
 const LEAST_BACK: u32 = 3;
 
-/// Half cycles in a window: of hum, and of an instability.
+/// Least half cycles of a hum in a window.
 const HUM_HALF_CYCLES: u32 = 40;
+/// Least half cycles of an instability in a window.
 const UNSTABLE_HALF_CYCLES: u32 = 6;
 
 /// Bound of errors and distances, counts.
@@ -205,9 +207,10 @@ struct Turns {
     large: u32,
     swings: u32,
     even_looks: u32,
-    /// The reference has moved in the window; the hum has been reported.
+    /// The reference has moved in the window.
     moved: bool,
-    told: bool,
+    /// The hum has been reported.
+    reported: bool,
 }
 
 /// Error and reference, counts, some looks after the last turn.
@@ -224,7 +227,7 @@ impl<S: Scalar> Oscillation<S> {
     pub fn new(feeds_friction: bool, unstable_counts: f64, period_s: f64) -> Self {
         let look_s = period_s * LOOK_TICKS;
         let looks = |time_s: f64| rounding::round(time_s / look_s).max(1.0) as u32;
-        let steps = f64::from(STEPS);
+        let steps = f64::from(REDUCTION_STEPS);
         Self {
             feeds_friction,
             steps_per_look: rounding::ceil(steps * look_s / REDUCING_S).clamp(1.0, steps) as u8,
@@ -250,7 +253,7 @@ impl<S: Scalar> Oscillation<S> {
     /// The share of the friction feedforward that acts, a [`Quantity::Multiplier`], while it is reduced.
     #[inline(always)]
     pub fn share(&self, state: &OscillationState) -> S {
-        S::scale_integer(i32::from(STEPS - state.reduced), self.share)
+        S::scale_integer(i32::from(REDUCTION_STEPS - state.reduced), self.share)
     }
 
     /// Looks at the axis; returns false if it is not stable.
@@ -260,9 +263,9 @@ impl<S: Scalar> Oscillation<S> {
             state.stroke = Stroke::default();
             state.stroke_before = Stroke::default();
             state.bad = 0;
-            let told = state.turns.told;
+            let reported = state.turns.reported;
             state.turns = Turns {
-                told,
+                reported,
                 ..Turns::default()
             };
             return true;
@@ -311,8 +314,11 @@ impl<S: Scalar> Oscillation<S> {
                 }
             }
             Phase::Reducing => {
-                state.reduced = state.reduced.saturating_add(self.steps_per_look).min(STEPS);
-                if state.reduced == STEPS {
+                state.reduced = state
+                    .reduced
+                    .saturating_add(self.steps_per_look)
+                    .min(REDUCTION_STEPS);
+                if state.reduced == REDUCTION_STEPS {
                     state.enter(Phase::Trial);
                 }
             }
@@ -392,7 +398,7 @@ impl<S: Scalar> Oscillation<S> {
         turns.begin_window();
         let mostly = |part: u32| part.saturating_mul(8) >= seen.half_cycles.saturating_mul(7);
         if !mostly(seen.even) || seen.half_cycles < UNSTABLE_HALF_CYCLES {
-            turns.told &= seen.moved;
+            turns.reported &= seen.moved;
             return true;
         }
         if mostly(seen.large) {
@@ -402,8 +408,8 @@ impl<S: Scalar> Oscillation<S> {
             return true;
         }
         if seen.half_cycles < HUM_HALF_CYCLES {
-            turns.told = false;
-        } else if !core::mem::replace(&mut turns.told, true) {
+            turns.reported = false;
+        } else if !core::mem::replace(&mut turns.reported, true) {
             let found = (seen.even, seen.even_looks, seen.swings);
             self.report(state, OscillationKind::Hum, found);
         }

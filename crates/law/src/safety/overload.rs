@@ -1,7 +1,7 @@
 //! The load of motor and amplifier: I²t.
 //!
 //! An amplifier's output is a force, so a current: the heat that it brings goes with the square of the output. The part
-//! beyond the output that the motor bears for ever is summed, a part below is taken from the sum, which never falls below
+//! beyond the output that the motor withstands indefinitely is summed, a part below is taken from the sum, which never falls below
 //! nothing. In converter's words, so that all number types find the same.
 
 use crate::rounding;
@@ -12,14 +12,14 @@ const LOOK_TICKS: f64 = super::plausibility::DUE_TICKS as f64;
 /// Watches the load of an axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overload {
-    /// Square of the word that the motor bears for ever.
+    /// Square of the word that the motor withstands indefinitely.
     continuous: i64,
     /// Sum of squares beyond it that is a fault; the largest number for none.
     budget: i64,
     offset: i32,
 }
 
-/// The squares of words, beyond the one that the motor bears for ever, that the motor has not got rid of yet.
+/// The squares of words, beyond the one that the motor withstands indefinitely, that the motor has not got rid of yet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OverloadState(i64);
 
@@ -31,8 +31,8 @@ impl Overload {
         offset: 0,
     };
 
-    /// A motor that bears `continuous` (converter's words, not negative) for ever and `largest` for `overload_s` (s), with
-    /// no force at the word `offset`; it is not watched if it bears the largest for ever. Settings time only.
+    /// A motor that withstands `continuous` (converter's words, not negative) indefinitely and `largest` for `overload_s` (s), with
+    /// no force at the word `offset`; it is not watched if it withstands the largest indefinitely. Settings time only.
     pub fn new(continuous: f64, largest: f64, overload_s: f64, offset: i32, period_s: f64) -> Self {
         if continuous >= largest {
             return Self::UNLIMITED;
@@ -45,7 +45,7 @@ impl Overload {
         }
     }
 
-    /// Takes the word that is put out; returns true if the motor bears it.
+    /// Takes the word that is put out; returns true if the motor withstands it.
     #[inline(always)]
     pub fn step(&self, state: &mut OverloadState, word: i16) -> bool {
         let force = i64::from(i32::from(word) - self.offset);

@@ -1,4 +1,4 @@
-//! The encoder held against the plant: the motion that an output must have caused has to be seen.
+//! The encoder compared with the plant: the motion that an output must have caused has to be seen.
 //!
 //! An encoder that dies lies to every other monitor too: with it, the axis neither leaves its reference nor is it too
 //! fast. The output does not lie. What is compared is the voltage that has reached the axis, which is that of the
@@ -20,7 +20,7 @@
 //!   once moved after enabling, a smaller one is the largest. The measured speed is that of [`Overspeed`], filtered over 8
 //!   ticks, or noise of some counts would look like motion; the voltage lags by as much more.
 //!
-//! All of it is in integers, whatever the number type: the output is the sum of the converter's words, speeds are those of
+//! All of it is in integers, for every number type: the output is the sum of the converter's words, speeds are those of
 //! the filter, shifted to the left as far as there is room. The comparison is made every fourth tick, of each axis in
 //! another: the sums lose nothing by it.
 //!
@@ -34,6 +34,7 @@ use crate::units::{POSITION_FRACTION_BITS, Position};
 
 /// Ticks from one comparison of an axis to the next, as a power of two.
 const INTERVAL_BITS: u32 = 2;
+/// The same as a number of ticks.
 const INTERVAL_TICKS: f64 = (1u32 << INTERVAL_BITS) as f64;
 
 /// Share of the output that is added to the largest load, for the error of the model's A: a quarter and a sixteenth.
@@ -43,8 +44,8 @@ const GAIN_ERROR_SHIFTS: (u32, u32) = (2, 4);
 /// is left over does not add up for hours.
 const FORGET_S: f64 = 0.3;
 
-/// Largest speed, and gain of speed from one comparison to the next, that there is room for.
-const ROOM: f64 = (1u32 << 28) as f64;
+/// Largest speed, and largest gain of speed from one comparison to the next.
+const MAX_SPEED: f64 = (1u32 << 28) as f64;
 
 /// Counts within which an encoder with one dead line dithers.
 const DITHER_COUNTS: u32 = 2;
@@ -52,7 +53,7 @@ const DITHER_COUNTS: u32 = 2;
 /// Comparisons over which the heading takes the mean of the motion, as a power of two.
 const MEAN_BITS: u32 = 4;
 
-/// Largest way that there is room for, counts.
+/// Largest way, counts.
 const LARGEST_WAY: f64 = (1u32 << 15) as f64;
 
 /// Fraction bits of the force of a speed.
@@ -106,7 +107,7 @@ pub struct PlausibilityModel {
     pub sliding_v: f64,
     /// The same of an axis that was turned around, or has not moved, V.
     pub turned_v: f64,
-    /// The largest that is believed of such an axis, whatever it has shown, V.
+    /// The largest that is believed of such an axis, with any motion that it has shown, V.
     pub most_turned_v: f64,
     /// Voltage with which the law answers a displacement, V/mm, at most.
     pub answer_v_per_mm: f64,
@@ -264,7 +265,7 @@ impl Plausibility {
         let largest = (model.largest_mm_s.max(model.velocity_mm_s) * filtered)
             .max(push * model.limit_v)
             .max(1.0);
-        let shift = whole_log2(ROOM / largest);
+        let shift = whole_log2(MAX_SPEED / largest);
         let unit = f64::from(1u32 << shift);
         let force = |volts: f64| rounding::round(push * volts * unit) as i32;
         let filter_s = period_s * (f64::from(1u32 << SPEED_FILTER_BITS) + 0.5 * INTERVAL_TICKS);
@@ -307,7 +308,7 @@ impl Plausibility {
     pub fn without_model(budget_v_s: f64, breakaway_v: f64, words: Words, period_s: f64) -> Self {
         let units = |value: f64| rounding::round(value * UNITS_PER_VOLT) as i32;
         Self {
-            // There is no telling what friction takes up.
+            // What friction takes up is unknown.
             held: i32::MAX,
             breakaway: units(breakaway_v),
             forget_shift: whole_log2(FORGET_S / (INTERVAL_TICKS * period_s)),
@@ -393,12 +394,12 @@ impl Plausibility {
         speed: i32,
         shown: Shown,
     ) -> bool {
-        let wanted = shown.reference.wrapping_sub(state.reference);
+        let requested = shown.reference.wrapping_sub(state.reference);
         let moved = counts.saturating_mul(1 << SPEED_FRACTION_BITS);
         state.reference = shown.reference;
         state.heading.turn(moved, state.force, self.turn);
         let step = Step {
-            wanted,
+            requested,
             moved,
             speed,
             force: state.force,
@@ -417,12 +418,15 @@ impl Plausibility {
     fn keeps_up(&self, lag: &mut Lag, step: Step) -> bool {
         let Step { moved, force, .. } = step;
         // Where the reference goes the other way, the axis need not lead it.
-        let kept = if step.wanted < 0 {
+        let kept = if step.requested < 0 {
             moved >> 1
         } else {
             moved << 1
         };
-        lag.behind = lag.behind.saturating_add(step.wanted).saturating_sub(kept);
+        lag.behind = lag
+            .behind
+            .saturating_add(step.requested)
+            .saturating_sub(kept);
         let alive = lag.way.saturating_sub(lag.pushed) > self.alive;
         if (lag.behind <= 0) | alive {
             let slides = step.heading > 0;
@@ -446,7 +450,7 @@ impl Plausibility {
         } else {
             lag.way = lag.way.saturating_add(moved);
             lag.pushed = lag.pushed.min(lag.way);
-            let wished = self.speed(step.wanted).max(0) >> INTERVAL_BITS;
+            let wished = self.speed(step.requested).max(0) >> INTERVAL_BITS;
             lag.thrown = lag.thrown.min(step.speed.saturating_sub(wished));
             lag.slides &= step.heading > 0;
         }
@@ -530,7 +534,7 @@ impl Plausibility {
 #[derive(Clone, Copy)]
 struct Step {
     /// Ways of the reference and of the axis, 2^-8 counts.
-    wanted: i32,
+    requested: i32,
     moved: i32,
     speed: i32,
     force: i32,
@@ -543,7 +547,7 @@ impl Step {
     #[inline(always)]
     fn reversed(self) -> Self {
         Self {
-            wanted: self.wanted.saturating_neg(),
+            requested: self.requested.saturating_neg(),
             moved: self.moved.saturating_neg(),
             speed: self.speed.saturating_neg(),
             force: self.force.saturating_neg(),
@@ -591,7 +595,7 @@ impl PlausibilityState {
             .wrapping_add(offset.wrapping_shl(SPEED_FRACTION_BITS));
     }
 
-    /// Begins a standstill anew: the loop is opened.
+    /// Begins a standstill again: the loop is opened.
     pub fn forget_standstill(&mut self) {
         self.travelled = 0;
         self.modelled = 0;

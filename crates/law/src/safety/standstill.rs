@@ -9,8 +9,8 @@ use super::monitor::speed_limit;
 
 /// The second filter works over 2^6 ticks.
 const FILTER_BITS: u32 = 6;
-/// Size of the alternating changes above which it is used, 2^-8 counts per tick: that of one count RMS is 12 on average.
-const NOISE: u32 = 8;
+/// Least size of the alternating changes with which the second filter is used, 2^-8 counts per tick: that of one count RMS is 12.
+const MIN_NOISE: u32 = 8;
 
 /// The judgement of whether an axis stands.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,7 +64,11 @@ impl Standstill {
         state.change = change;
         let filtered = state.filtered >> FILTER_BITS;
         state.filtered += speed - filtered;
-        let judged = if state.noise > NOISE { filtered } else { speed };
+        let judged = if state.noise > MIN_NOISE {
+            filtered
+        } else {
+            speed
+        };
         judged.unsigned_abs() <= self.limit
     }
 }

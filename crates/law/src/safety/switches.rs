@@ -4,12 +4,17 @@
 use super::fault::{EnableInterlock, FaultCode};
 use crate::axes::AxisName;
 
-/// Bits of each axis.
+/// Number of bits of an axis.
 const BITS_PER_AXIS: u32 = 5;
+/// Bit of an axis' negative limit switch.
 const NEGATIVE_LIMIT: u16 = 0b0_0001;
+/// Bit of its positive limit switch.
 const POSITIVE_LIMIT: u16 = 0b0_0010;
+/// Bit of its home switch.
 const HOME: u16 = 0b0_0100;
+/// Bit of its amplifier's fault.
 const AMPLIFIER_FAULT: u16 = 0b0_1000;
+/// Bit of an output that the converter does not hold.
 const OUTPUT_MISMATCH: u16 = 0b1_0000;
 /// The stage's own bit, above all axes'.
 const EMERGENCY_STOP: u16 = 1 << (3 * BITS_PER_AXIS);

@@ -11,7 +11,7 @@ use crate::rounding;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Fixed(pub i32);
 
-/// A constant as a normalised mantissa and a shift, `mantissa * 2^-shift`: 31 significant bits whatever its size. Zero by
+/// A constant as a normalised mantissa and a shift, `mantissa * 2^-shift`: 31 significant bits at any size. Zero by
 /// default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FixedGain {

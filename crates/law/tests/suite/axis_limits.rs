@@ -1,4 +1,4 @@
-//! Whatever the encoders say, the outputs stay within their limits and the memory stays sound.
+//! With any readings of the encoders, the outputs stay within their limits and the memory stays sound.
 
 use proptest::prelude::*;
 use quadrant_law::axes::PerAxis;
@@ -166,7 +166,7 @@ fn limit_offset_and_sign_make_the_code() {
         axis.amplifier.reversed = true;
     });
     assert_eq!(reversed, 13107);
-    // The offset is of the converter, whatever the sense of the axis.
+    // The offset is of the converter, for either sense of the axis.
     for reversed in [false, true] {
         let code = code_at_error(|axis| {
             axis.amplifier.output_limit_v = 4.0;

@@ -12,8 +12,9 @@ use quadrant_settings::{EmergencyReaction, StageSettings};
 use crate::stops::follow;
 use quadrant_test_support::{Rig, repeatable, sine_on_x};
 
-/// Ticks that the brake of these tests takes.
+/// Ticks in which the brake of these tests releases.
 const RELEASE: u32 = 300;
+/// Ticks in which it applies.
 const APPLY: u32 = 200;
 
 fn settings() -> StageSettings {

@@ -12,6 +12,7 @@ use quadrant_test_support::{Rig, x_alone};
 const RESOLUTION_MM: f64 = 5e-4;
 /// Ticks before the change: into the motion, out of the lead-in.
 const BEFORE: usize = 2000;
+/// Ticks after the change.
 const AFTER: usize = 4000;
 /// Lag of the machine when the change comes.
 const LAG_MM: f64 = 0.05;
@@ -25,7 +26,7 @@ fn plan() -> PlanSettings {
     plan
 }
 
-/// Runs x along its sine while the machine lags by a growing distance, whatever the output: every law sees the same
+/// Runs x along its sine while the machine lags by a growing distance, for any output: every law sees the same
 /// counts. Returns the volts of every tick and the transfer offset.
 fn volts<S: Scalar>(first: &StageSettings, second: Option<&StageSettings>) -> Vec<(f64, f64)> {
     let mut rig = Rig::<S>::new(first, &plan());

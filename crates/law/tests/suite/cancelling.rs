@@ -1,4 +1,4 @@
-//! Cancelling of a cut's vibration: it takes away what turns with the spindle, stays within its limit whatever happens, and does
+//! Cancelling of a cut's vibration: it takes away what turns with the spindle, stays within its limit in every case, and does
 //! nothing where it is left out.
 
 use proptest::prelude::*;
@@ -133,17 +133,17 @@ fn without_a_spindle_or_a_voltage_every_word_is_that_of_an_axis_without_cancelli
 }
 
 #[test]
-fn the_speed_that_is_told_counts_until_the_next_and_survives_disabling_and_an_exchange() {
-    let tell = |axis: &mut Axis<f32>, rpm| {
+fn the_speed_that_is_set_counts_until_the_next_and_survives_disabling_and_an_exchange() {
+    let set_speed = |axis: &mut Axis<f32>, rpm| {
         let speed = SpindleSpeed::from_rpm(rpm, PERIOD_S);
-        axis.rig.state.tell_spindle(speed);
+        axis.rig.state.set_spindle_speed(speed);
     };
     let mut axis = shaken::<f32>(&cancelling(0.0), (0.1, 100.0));
     assert_eq!(largest(&mut axis, 1.0), 0.0);
-    tell(&mut axis, rpm(100.0));
+    set_speed(&mut axis, rpm(100.0));
     axis.run(3.0);
     assert!(largest(&mut axis, 0.5) > 0.05);
-    // The output begins anew, and the speed is still known.
+    // The output begins again, and the speed is still known.
     axis.rig.inputs.settings_changed[AxisName::X] = true;
     axis.tick();
     assert!(largest(&mut axis, 0.001).abs() < 1e-3);
@@ -157,7 +157,7 @@ fn the_speed_that_is_told_counts_until_the_next_and_survives_disabling_and_an_ex
     axis.command(Command::Run);
     axis.run(3.0);
     assert!(largest(&mut axis, 0.5) > 0.05);
-    tell(&mut axis, 0.0);
+    set_speed(&mut axis, 0.0);
     axis.run(1.5);
     assert!(largest(&mut axis, 0.5) < 1e-4);
 }
@@ -177,7 +177,7 @@ fn a_ramp_of_the_speed_under_a_cut_harms_little_and_ends_in_cancelling() {
     // From 20 to 200 Hz through that of the cut, and back to it.
     for (to_hz, seconds) in [(200.0, 5.4), (20.0, 5.4), (100.0, 2.4)] {
         let speed = SpindleSpeed::from_rpm(rpm(to_hz), PERIOD_S);
-        axis.rig.state.tell_spindle(speed);
+        axis.rig.state.set_spindle_speed(speed);
         let most = largest_window(&mut axis, seconds);
         println!("to {to_hz} Hz: {most}, without {without}");
         assert!(most < 2.0 * without);
@@ -244,7 +244,7 @@ fn answered<S: Scalar>(
 }
 
 #[test]
-fn a_voltage_that_the_axis_answers_a_quarter_of_a_turn_aside_of_its_model_is_unlearnt() {
+fn a_voltage_in_quadrature_to_the_model_is_unlearnt() {
     fn left_after_a_second<S: Scalar>() -> f64 {
         let (late, mm_per_v) = (20, 0.2);
         let mut axis = shaken::<S>(&cancelling(rpm(200.0)), (0.2, 200.0));
@@ -260,11 +260,11 @@ fn a_voltage_that_the_axis_answers_a_quarter_of_a_turn_aside_of_its_model_is_unl
 }
 
 #[test]
-fn an_axis_that_answered_aside_for_long_cancels_again_in_two_seconds() {
+fn an_axis_that_responded_in_quadrature_for_long_cancels_again_in_two_seconds() {
     let mut axis = shaken::<f32>(&cancelling(rpm(200.0)), (0.0, 200.0));
     axis.run(0.5);
-    let aside_mm = answered(&mut axis, 40.0, 0.004, (36, 0.2));
-    assert!(aside_mm > 0.004, "{aside_mm} mm");
+    let quadrature_mm = answered(&mut axis, 40.0, 0.004, (36, 0.2));
+    assert!(quadrature_mm > 0.004, "{quadrature_mm} mm");
     let well_mm = answered(&mut axis, 2.0, 0.004, (25, 0.05));
     assert!(well_mm < 0.002, "{well_mm} mm of 0.004 mm are left");
 }
@@ -286,27 +286,27 @@ fn a_reversal_that_errs_unlearns_little() {
 }
 
 #[test]
-fn a_speed_that_is_told_wrong_by_a_percent_is_followed_and_not_by_more() {
-    fn followed<S: Scalar>(hz: f64, told: f64) -> f64 {
-        let [with, without] = [cancelling(told * rpm(hz)), fixed()].map(|settings| {
+fn a_speed_that_is_set_wrong_by_a_percent_is_followed_and_not_by_more() {
+    fn followed<S: Scalar>(hz: f64, set: f64) -> f64 {
+        let [with, without] = [cancelling(set * rpm(hz)), fixed()].map(|settings| {
             let mut axis = shaken::<S>(&settings, (0.1, hz));
             axis.run(5.0);
             axis.run(2.0)
         });
         with / without
     }
-    for (hz, told) in [
+    for (hz, set) in [
         (100.0, 1.003),
         (100.0, 1.01),
         (100.0, 0.99),
         (40.0, 1.01),
         (150.0, 0.995),
     ] {
-        let left = [followed::<f32>(hz, told), followed::<Fixed>(hz, told)];
-        println!("{hz} Hz x {told}: {left:?}");
+        let left = [followed::<f32>(hz, set), followed::<Fixed>(hz, set)];
+        println!("{hz} Hz x {set}: {left:?}");
         assert!(
             left.into_iter().all(|left| left < 0.1),
-            "{left:?}, {hz} Hz x {told}"
+            "{left:?}, {hz} Hz x {set}"
         );
     }
     let beyond = followed::<f32>(100.0, 1.05);
@@ -314,7 +314,7 @@ fn a_speed_that_is_told_wrong_by_a_percent_is_followed_and_not_by_more() {
 }
 
 #[test]
-fn a_vector_that_learns_slowly_keeps_to_the_speed_that_is_told() {
+fn a_vector_that_learns_slowly_keeps_to_the_speed_that_is_set() {
     // A sixth of the rate: what it shows while it learns is no rotation.
     let load = (0.3, 500.0);
     let [with, without] = [cancelling(rpm(500.0)), fixed()].map(|settings| {
@@ -326,7 +326,7 @@ fn a_vector_that_learns_slowly_keeps_to_the_speed_that_is_told() {
 }
 
 #[test]
-fn what_was_followed_ends_with_the_next_speed_that_is_told() {
+fn what_was_followed_ends_with_the_next_speed_that_is_set() {
     let load = (0.1, 100.0);
     let without = shaken::<f32>(&fixed(), load).run(3.0);
     let mut axis = shaken::<f32>(&cancelling(1.01 * rpm(100.0)), load);
@@ -334,9 +334,9 @@ fn what_was_followed_ends_with_the_next_speed_that_is_told() {
     let followed = axis.run(1.0);
     assert!(followed < 0.1 * without, "{followed} of {without}");
     let speed = SpindleSpeed::from_rpm(rpm(100.0), PERIOD_S);
-    axis.rig.state.tell_spindle(speed);
-    let told = axis.run(0.5);
-    assert!(told < 0.1 * without, "{told} of {without}");
+    axis.rig.state.set_spindle_speed(speed);
+    let restarted = axis.run(0.5);
+    assert!(restarted < 0.1 * without, "{restarted} of {without}");
 }
 
 #[test]
@@ -348,7 +348,7 @@ fn the_speed_changes_no_faster_than_the_settings_say() {
         let mut axis = shaken::<f32>(&settings, (0.1, 100.0));
         axis.rig
             .state
-            .tell_spindle(SpindleSpeed::from_rpm(rpm(100.0), PERIOD_S));
+            .set_spindle_speed(SpindleSpeed::from_rpm(rpm(100.0), PERIOD_S));
         (0..200).find(|_| largest(&mut axis, 0.05) > 0.04)
     };
     let (slow, quick) = (time_to_100_hz(480.0), time_to_100_hz(1e5));
@@ -452,7 +452,7 @@ fn every_parameter_changes_the_output() {
         axis.run(0.5);
         axis.rig
             .state
-            .tell_spindle(SpindleSpeed::from_rpm(rpm(90.0), PERIOD_S));
+            .set_spindle_speed(SpindleSpeed::from_rpm(rpm(90.0), PERIOD_S));
         axis.run(0.5);
         axis.rig.state.axes()[0].telemetry().code_sum
     };
@@ -490,10 +490,10 @@ fn hostile<S: Scalar>(steps: &[(i32, u16, u32)]) -> Result<(), TestCaseError> {
     let mut settings = cancelling(rpm(100.0));
     part(&mut settings).rate_per_s = 20.0;
     part(&mut settings).limit_v = 0.02;
-    let mut rig = Rig::<S>::that_bears_any_error(settings);
+    let mut rig = Rig::<S>::that_allows_any_error(settings);
     for &(step, ticks, rpm) in steps {
         let speed = SpindleSpeed::from_rpm(f64::from(rpm), PERIOD_S);
-        rig.state.tell_spindle(speed);
+        rig.state.set_spindle_speed(speed);
         rig.show_counts(step, ticks, |axis| {
             let added = axis.cancelling().voltage();
             prop_assert!(added.abs() <= 0.02001, "{added} V");

@@ -50,7 +50,7 @@ proptest! {
         prop_assert_eq!(Decimal(value).to_string(), value.to_string());
     }
 
-    /// Whatever is shown is the number to twelve digits.
+    /// The text shows the number to twelve digits.
     #[test]
     fn what_is_shown_is_the_number(value in proptest::num::f64::NORMAL) {
         let shown: f64 = Decimal(value).to_string().parse().expect("a number");

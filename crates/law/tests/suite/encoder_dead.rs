@@ -327,8 +327,9 @@ fn run_until_off(settings: &StageSettings, truth: &Truth, activity: Activity, de
 
 /// The stated bounds: outputs off before so much unplanned motion.
 const MOST_MM: f64 = 2.0;
-/// The same in a jog at 1 mm/s; by speed: `encoder_dead_by_speed`.
+/// Largest motion in a jog at 1 mm/s; by speed: `encoder_dead_by_speed`.
 const SLOW_MM: f64 = 3.0;
+/// Longest time of that motion, ms.
 const MOST_MS: f64 = 50.0;
 /// The same of an encoder that shows some of the motion.
 const GAPS_MS: f64 = 65.0;
@@ -340,7 +341,7 @@ fn is_unseen(activity: Activity, death: Death) -> bool {
     match (death, activity) {
         // What a load does to an axis that stands is seen by the encoder alone.
         (_, Activity::RestUnderLoad) => death != Death::Reversed,
-        // It is slower than its gaps; the index pulses tell.
+        // It is slower than its gaps; the index pulses show it.
         (Death::Intermittent, Activity::Jog(speed) | Activity::JogFromRest(speed)) => speed <= 10.0,
         // A cut is a load that comes and goes in the gaps.
         (Death::Intermittent, Activity::CutSine(..)) => true,
@@ -518,7 +519,7 @@ fn a_healthy_axis_is_left_alone() {
     println!("{runs} runs of 1.2 s");
 }
 
-/// Vibration or noise that shakes an axis loose while it is measured hides friction at rest, not while sliding.
+/// Vibration or noise that makes an axis break away while it is measured hides friction at rest, not while sliding.
 #[test]
 fn friction_at_rest_that_was_taken_for_less_than_while_sliding_is_no_fault_of_the_encoder() {
     let mut settings = StageSettings::simulated();

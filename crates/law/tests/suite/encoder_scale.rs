@@ -10,9 +10,10 @@ use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::FaultCode;
 use quadrant_settings::StageSettings;
 
-/// Ticks from enabling until the sine has risen, and those that are looked at.
-const RISEN: u32 = 5000;
-const WINDOW: u32 = 40_000;
+/// Ticks from enabling until the sine has reached its amplitude.
+const RISE_TICKS: u32 = 5000;
+/// Ticks that are examined.
+const WINDOW_TICKS: u32 = 40_000;
 
 /// A sine of 2 mm.
 fn sine(velocity_mm_s: f64) -> Order {
@@ -53,7 +54,7 @@ fn an_encoder_of_another_scale_shows_what_an_axis_of_another_mass_shows_bit_for_
         };
         let mut wrong = axis(sine(60.0), MODEL, 1.0, scaled(scale));
         let mut right = axis(sine(60.0), lighter, 1.0 / scale, healthy());
-        for _ in 0..BEFORE + RISEN + WINDOW {
+        for _ in 0..BEFORE + RISE_TICKS + WINDOW_TICKS {
             wrong.tick();
             right.tick();
             assert_eq!(wrong.output_v, right.output_v, "{scale}: {}", wrong.ticks);
@@ -83,11 +84,11 @@ fn fit(mut axis: Lone<f32>) -> Result<Fit, FaultCode> {
     // Differences over 4 ms, and the output by the dead time before.
     const SPAN: usize = 20;
     let lag = (plant.delay_s / PERIOD_S).round() as usize;
-    for _ in 0..BEFORE + RISEN {
+    for _ in 0..BEFORE + RISE_TICKS {
         axis.tick();
     }
     let (mut outputs, mut positions) = (vec![], vec![]);
-    for _ in 0..WINDOW {
+    for _ in 0..WINDOW_TICKS {
         axis.tick();
         positions.push(axis.shown_mm);
         outputs.push(axis.output_v);
@@ -127,7 +128,7 @@ fn fit(mut axis: Lone<f32>) -> Result<Fit, FaultCode> {
 }
 
 #[test]
-fn seconds_of_motion_tell_a_scale_only_as_another_mass() {
+fn seconds_of_motion_show_a_scale_only_as_another_mass() {
     let truth = |gain: f64, damping: f64, friction: f64| Truth {
         gain,
         damping,
@@ -186,13 +187,13 @@ fn seconds_of_motion_tell_a_scale_only_as_another_mass() {
 fn counts_at_rest(probe_v: f64) -> f64 {
     let mut axis = axis(Order::Rest, MODEL, 1.0, healthy());
     let (mut across, mut along) = (0.0, 0.0);
-    for _ in 0..BEFORE + RISEN + WINDOW {
+    for _ in 0..BEFORE + RISE_TICKS + WINDOW_TICKS {
         let turns = 10.0 * f64::from(axis.ticks) * PERIOD_S;
         let (sine, cosine) = (core::f64::consts::TAU * turns).sin_cos();
         axis.plant.load_v = probe_v * sine;
         axis.tick();
-        if axis.ticks > BEFORE + RISEN {
-            let share = axis.plant.position_mm / COUNT_MM * 2.0 / f64::from(WINDOW);
+        if axis.ticks > BEFORE + RISE_TICKS {
+            let share = axis.plant.position_mm / COUNT_MM * 2.0 / f64::from(WINDOW_TICKS);
             (across, along) = (across + share * sine, along + share * cosine);
         }
     }

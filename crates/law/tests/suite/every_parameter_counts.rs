@@ -170,7 +170,7 @@ fn with_kind(kind: FeedforwardKind) -> StageSettings {
             high_frequency_gain: 0.9,
         }];
         axis.feedback.filters = Some(filters.into_iter().collect());
-        // As much nonlinear gain as the plant bears, so that less damping bears less.
+        // As much nonlinear gain as the plant allows, so that less damping allows less.
         let plant = axis.plant.expect("a plant by default");
         let period_s = 1.0 / settings.rate_hz;
         let bound = filtered_sector_bound(&plant, &axis.feedback.pid, &filters, period_s);
@@ -232,7 +232,7 @@ fn every_parameter_acts_with_combined_feedforward_or_with_its_own_kind() {
     let mut others: Vec<String> = OF_ONE_KIND
         .iter()
         .flat_map(|(_, fields)| on_each_axis(fields))
-        // An exponent below one is refused, whatever the kind.
+        // An exponent below one is refused, for every kind.
         .filter(|path| !path.ends_with("exponent"))
         .collect();
     combined.sort();
@@ -277,7 +277,7 @@ fn every_parameter_of_a_law_acts_where_the_law_does() {
         for axis in 0..3 {
             let own = format!("/axes/{axis}/feedback/{field}/");
             let idle = inert(&settings, |path| path.starts_with(&own));
-            // The first point of a schedule is at rest, whatever else is tried.
+            // The first point of a schedule is at rest, in every variant.
             assert!(idle.is_empty(), "{idle:?}");
         }
     }

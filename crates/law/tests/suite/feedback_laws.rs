@@ -128,7 +128,7 @@ fn the_default_laws_are_one_pid_at_small_errors() {
             ..settings.clone()
         };
         for gains in of.linear_gains() {
-            let near = |found: f64, wanted: f64| (found - wanted).abs() < 1e-9 * wanted.abs();
+            let near = |found: f64, expected: f64| (found - expected).abs() < 1e-9 * expected.abs();
             assert!(
                 near(gains.kp_v_per_mm, settings.pid.kp_v_per_mm),
                 "{kind:?}"

@@ -204,7 +204,7 @@ proptest! {
         }
     }
 
-    /// On a surface of constant level, whatever the shape of the cycle and wherever it starts.
+    /// On a surface of constant level, with any shape of the cycle from any start.
     #[test]
     fn a_closed_cycle_takes_work(
         elements in elements(),

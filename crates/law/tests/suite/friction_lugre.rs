@@ -164,7 +164,7 @@ proptest! {
         }
     }
 
-    /// The bristles store no more than they are given, whatever the velocity does: at most the last step's share is
+    /// The bristles store no more than they are given, at any velocity: at most the last step's share is
     /// counted differently by a sum over steps.
     #[test]
     fn the_bristles_are_passive(path in prop::collection::vec(-5.0f64..5.0, 1..60)) {

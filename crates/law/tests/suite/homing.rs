@@ -12,8 +12,9 @@ use quadrant_settings::{AxisSettings, HomeSwitch, HomingSettings, PlanSettings};
 
 use quadrant_test_support::{Noise, Rig, repeatable, with_x};
 
-/// Counts between index pulses, and where one of them is.
+/// Counts between index pulses.
 const REVOLUTION: i64 = 20_000;
+/// Count of one of them.
 const PULSE: i64 = 8_000;
 
 /// The machine around the x axis, in its own counts, of which the encoder knows nothing.
@@ -82,9 +83,9 @@ impl Machine {
     fn tick(&mut self, command: Option<Command>) {
         let telemetry = *self.rig.state.axes()[0].telemetry();
         let drives = self.rig.state.safety().drives();
-        let wanted = telemetry.reference.0 >> 16;
+        let reference = telemetry.reference.0 >> 16;
         let step = if drives {
-            wanted - telemetry.measured.0
+            reference - telemetry.measured.0
         } else {
             0
         };

@@ -290,7 +290,7 @@ proptest! {
     #![proptest_config(repeatable(400))]
 
     #[test]
-    fn whatever_is_injected_and_read_the_outputs_are_bounded_and_the_end_is_zero(
+    fn outputs_are_bounded_and_end_at_zero_with_any_injection_and_reading(
         open_loop: bool,
         limit_v in any_f32(),
         travel_mm in any_f32(),

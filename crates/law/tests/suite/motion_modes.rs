@@ -67,7 +67,7 @@ fn a_stop_brakes_a_motion_in_flight_without_a_jolt_and_holds() {
         follow(&mut rig, after);
         rig.inputs.command = Some(Command::Stop);
         let (velocity_change, jolt) = roughness(&mut rig, 1_000);
-        // 4000 mm/s^2 and 1e6 mm/s^3: per tick 0.4 mm/s and 100 mm/s^2. Where the stop takes over, an acceleration that speeds
+        // 4000 mm/s^2 and 1e6 mm/s^3: per tick 0.4 mm/s and 100 mm/s^2. Where the stop begins, an acceleration that speeds
         // the axis up ends at once: of this motion at most 500 mm/s^2.
         assert!(velocity_change <= 0.4 + 0.001, "{velocity_change}");
         assert!(jolt <= 500.0 + 100.0 + 10.0, "{jolt} after {after}");

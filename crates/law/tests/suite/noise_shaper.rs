@@ -82,7 +82,7 @@ fn after_the_end_of_the_range_it_recovers_within_three_words() {
 
 #[test]
 fn noise_at_low_frequencies_falls_with_the_order() {
-    // A slow sine, and what is lost of it below a fiftieth of the sample rate: a moving mean of 50 words.
+    // A slow sine, and what is lost of it below 1/50 of the sample rate: a moving mean of 50 words.
     let of = |shaper: NoiseShaper| {
         let mut state = NoiseShaperState::default();
         let errors: Vec<f64> = (0..100_000)
@@ -105,7 +105,7 @@ fn noise_at_low_frequencies_falls_with_the_order() {
 }
 
 proptest! {
-    /// Whatever comes in: words in range, and a first-order sum that is exact to half a step.
+    /// With any input: words in range, and a first-order sum that is exact to half a step.
     #[test]
     fn any_sequence_within_the_range_is_exact_in_the_sum(codes in prop::collection::vec(-32_700_i16..=32_700, 1..400)) {
         let (_, first) = lost(NoiseShaper::FirstOrder, codes.iter().copied());

@@ -92,8 +92,8 @@ fn enabling_is_refused_with_the_reason_and_the_remedy() {
     supervisor.step(READY, None);
     let decision = supervisor.step(READY, Some(Command::Enable));
     assert_eq!(decision.command, None);
-    let told = Event::Refused(Command::Enable, Refusal::NotCommissioned);
-    assert!(decision.events.contains(&Some(told)));
+    let refused = Event::Refused(Command::Enable, Refusal::NotCommissioned);
+    assert!(decision.events.contains(&Some(refused)));
 }
 
 #[test]

@@ -101,7 +101,7 @@ fn truth(hz: f64, side: EncoderSide) -> AxisParameters {
     truth
 }
 
-/// The x axis with a feedforward and gains that bear a spring between motor and table.
+/// The x axis with a feedforward and gains that suit a spring between motor and table.
 fn soft(kind: FeedforwardKind) -> StageSettings {
     x_alone(|x| {
         x.feedback.law = LawKind::Pid;

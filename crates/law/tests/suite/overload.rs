@@ -23,7 +23,7 @@ fn found(overload: &Overload, words: impl IntoIterator<Item = i16>) -> Option<f6
 }
 
 #[test]
-fn a_motor_bears_the_largest_output_for_the_time_given_and_the_continuous_one_for_ever() {
+fn a_motor_withstands_the_largest_output_for_the_time_given_and_the_continuous_one_indefinitely() {
     let overload = Overload::new(8000.0, 32_000.0, 2.0, 0, PERIOD_S);
     let at = |word: i16| found(&overload, std::iter::repeat_n(word, 1_000_000));
     for word in [32_000, -32_000] {
@@ -58,7 +58,7 @@ fn rest_pays_for_no_later_load_and_a_long_one_counts_no_more_than_the_budget() {
         .find(|_| !overload.step(&mut state, 32_000))
         .expect("found");
     assert!(until.abs_diff(looks(2.0)) <= 2, "{until} looks");
-    // Ten times as long as it bears: it cools from the budget. (32² - 8²) / 8² times 2 s at rest are enough for all of it.
+    // Ten times as long as it withstands: it cools from the budget. (32² - 8²) / 8² times 2 s at rest are enough for all of it.
     for _ in 0..looks(20.0) {
         overload.step(&mut state, 32_000);
     }
@@ -77,7 +77,7 @@ proptest! {
     #![proptest_config(repeatable(64))]
 
     #[test]
-    fn a_duty_that_the_motor_bears_is_never_found(
+    fn a_duty_that_the_motor_withstands_is_never_found(
         continuous in 1000.0..30_000.0f64,
         peak in 1.05..4.0f64,
         burst_s in 0.01..1.0f64,
@@ -98,7 +98,7 @@ proptest! {
     }
 }
 
-/// An x axis that bears 0.5 V for ever and 1 V for 50 ms.
+/// An x axis that withstands 0.5 V indefinitely and 1 V for 50 ms.
 fn settings() -> StageSettings {
     with_x(|x| {
         x.amplifier.output_limit_v = 1.0;

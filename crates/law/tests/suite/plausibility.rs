@@ -19,6 +19,7 @@ const PERIOD_S: f64 = 1e-4;
 const COUNT_MM: f64 = 5e-4;
 /// Ticks from one comparison to the next.
 const INTERVAL: u32 = 4;
+/// The same in seconds.
 const INTERVAL_S: f64 = INTERVAL as f64 * PERIOD_S;
 /// Time in which a distance is forgotten: the largest power of two of comparisons within 0.3 s.
 const FORGET_S: f64 = 512.0 * INTERVAL_S;
@@ -424,9 +425,9 @@ fn a_loop_that_is_opened_begins_its_standstill_anew() {
         }
         (0..1000).find(|_| !step(&mut state)).expect("found")
     };
-    let anew = found_after(30, true);
-    assert_eq!(found_after(100, true), anew);
-    assert!(found_after(30, false) < anew);
+    let restarted = found_after(30, true);
+    assert_eq!(found_after(100, true), restarted);
+    assert!(found_after(30, false) < restarted);
     assert!(found_after(100, false) < found_after(30, false));
 }
 
@@ -493,8 +494,9 @@ fn found_in_jog(
     None
 }
 
-/// Voltage at which the axis of these jogs slides, V, and how long it does, s.
+/// Voltage at which the axis of these jogs slides, V.
 const SLIDES_V: f64 = 0.2;
+/// Time for which it slides, s.
 const SLIDES_S: f64 = 0.3;
 
 fn following_model() -> PlausibilityModel {

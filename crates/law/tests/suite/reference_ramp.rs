@@ -158,7 +158,7 @@ proptest! {
     }
 
     #[test]
-    fn a_motion_in_flight_is_taken_over_without_a_jump(
+    fn a_motion_in_flight_is_continued_without_a_jump(
         (acceleration, jerk) in any_limits(),
         speed in -100.0f64..100.0,
         share in -1.0f64..1.0,
@@ -282,7 +282,7 @@ fn the_extremes_of_scale_saturate_and_come_to_rest() {
                 assert!(ramp.stop_reach(&state).iter().all(|reach| reach.0 >= 0));
                 ramp.step(&mut state, Velocity::ZERO);
                 let now = state.velocity().to_mm_s(scale).abs();
-                // The acceleration that was taken over may last for a few ticks.
+                // The acceleration that was adopted may last for a few ticks.
                 assert!(now <= speed + 3e4 / rate_hz || now <= 1e3);
                 speed = now;
             }

@@ -73,7 +73,7 @@ fn the_first_motion_after_a_rest_errs_like_any_other() {
         ("a smaller gain", errors_um::<f32>(&half)),
     ] {
         println!("{what}: {in_motion:.1} um in motion, {after:.1} um after a rest");
-        // The model's elements share what they take over by their weights, and the axis' by their springs.
+        // The model's elements share the adopted voltage by their weights, and the axis' by their springs.
         assert!(after < in_motion + 7.0, "{what}: {after} um");
     }
 }
@@ -110,9 +110,9 @@ fn the_output_goes_on_from_where_it_was() {
         ("learning, fixed point", at_start::<Fixed>(&learning, 1.3)),
         ("filtered", at_start::<f32>(&filtered, 1.0)),
     ] {
-        println!("{what}: a step of {step:.4} V, {moved:.4} V taken over");
-        // A count moves the derivative by half as much as is taken over here, and is there without a rest, too.
-        assert!(moved > 0.1, "{what}: {moved} V taken over");
+        println!("{what}: a step of {step:.4} V, {moved:.4} V adopted");
+        // A count moves the derivative by half as much as is adopted here, and is there without a rest, too.
+        assert!(moved > 0.1, "{what}: {moved} V adopted");
         assert!(step < 0.5 * moved, "{what}: {step} V");
     }
 }
@@ -132,7 +132,7 @@ fn without_friction_fed_forward_the_integral_keeps_what_it_has() {
 }
 
 #[test]
-fn no_more_than_friction_can_be_is_taken_over() {
+fn no_more_than_friction_can_be_is_adopted() {
     let breakaway_v = fixed().axes[0].friction.sliding.positive.curve.breakaway_v;
     for pushed_v in [-0.5, 0.5] {
         let mut axis = Axis::<f32>::on_sine(&fixed(), 1.0);
@@ -147,7 +147,7 @@ fn no_more_than_friction_can_be_is_taken_over() {
         axis.run(5e-4);
         let taken = f64::from(before - axis.seen().feedback.integral).abs();
         let gms = f64::from(axis.seen().feedforward.gms).abs();
-        println!("{pushed_v} V: {taken:.4} V of {before:.4} V taken over, then {gms:.4} V");
+        println!("{pushed_v} V: {taken:.4} V of {before:.4} V adopted, then {gms:.4} V");
         assert!(gms < 1.02 * breakaway_v && taken < 2.02 * breakaway_v && taken > 0.0);
         // The load stays the integral's, and the axis runs on.
         axis.run(3.0);

@@ -1,4 +1,4 @@
-//! The faults as `docs/safety.md` has them, written by hand: what the law does is held against this, not against the law's
+//! The faults as `docs/safety.md` has them, written by hand: what the law does is compared with this, not with the law's
 //! own tables.
 
 use quadrant_law::axes::AxisName;

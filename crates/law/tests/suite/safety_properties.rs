@@ -1,4 +1,4 @@
-//! Whatever comes in: nothing is driven unasked, and what a fault promises is kept.
+//! With any input: nothing is driven unasked, and what a fault promises is kept.
 
 use proptest::prelude::*;
 use quadrant_law::command::Command;
@@ -243,7 +243,7 @@ proptest! {
         prop_assert!(distance_mm <= speed * (ramp_s + 20e-4), "{distance_mm} mm");
         if hold {
             prop_assert!(rig.state.safety().is_enabled());
-            let held = rig.state.held().expect("told");
+            let held = rig.state.held().expect("a fault is reported");
             prop_assert_eq!(held.code, quadrant_law::safety::FaultCode::LinkLost);
         } else {
             prop_assert!(matches!(rig.state.safety(), SafetyState::Faulted(_)));

@@ -57,7 +57,7 @@ fn one_axis_is_exchanged_without_a_jump_and_without_the_others() {
     };
     pieces.tick(&plan, &mut state, &changed);
     stage.tick(&plan, &mut other, &moved);
-    assert!((volts(&state, 0) - before).abs() < 1e-3, "x takes over");
+    assert!((volts(&state, 0) - before).abs() < 1e-3, "x continues");
     assert!(state.axes()[0].telemetry().bumpless_offset.abs() > 0.01);
     for axis in [1, 2] {
         assert_eq!(state.axes()[axis], other.axes()[axis]);

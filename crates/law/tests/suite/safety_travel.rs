@@ -289,7 +289,10 @@ fn a_lost_link_that_holds_can_be_followed_by_a_motion() {
         assert!(rig.tick().enabled);
     }
     assert!(!rig.state.is_running());
-    assert_eq!(rig.state.held().expect("told").code, FaultCode::LinkLost);
+    assert_eq!(
+        rig.state.held().expect("a fault is reported").code,
+        FaultCode::LinkLost
+    );
     rig.command(Command::Run);
     assert!(rig.state.is_running(), "{:?}", rig.state.safety());
     assert_eq!(rig.state.held(), None);

@@ -1,4 +1,4 @@
-//! The commands that the supervising task lets through, and the events that it tells.
+//! The commands that the supervising task lets through, and the events that it reports.
 
 use quadrant_law::admission::Refusal;
 use quadrant_law::admission::StageView;
@@ -98,14 +98,14 @@ fn requests_are_refused_with_a_reason_where_they_do_not() {
     ] {
         let decision = decide(view, view, Some(command));
         assert_eq!(decision.command, None, "{view:?} {command:?}");
-        let told = Event::Refused(command, reason);
-        assert_eq!(decision.events, [None, None, None, None, Some(told)]);
+        let refused = Event::Refused(command, reason);
+        assert_eq!(decision.events, [None, None, None, None, Some(refused)]);
         assert!(!reason.as_str().is_empty());
     }
 }
 
 #[test]
-fn changes_of_state_are_told_once() {
+fn changes_of_state_are_reported_once() {
     assert_eq!(events(DISABLED, ENABLED), [Event::Enabled]);
     assert_eq!(events(ENABLED, DISABLED), [Event::Disabled]);
     assert_eq!(events(FAULTED, DISABLED), [Event::Disabled]);
@@ -119,7 +119,7 @@ fn changes_of_state_are_told_once() {
 }
 
 #[test]
-fn motions_are_told_when_they_begin_and_end() {
+fn motions_are_reported_when_they_begin_and_end() {
     assert_eq!(events(ENABLED, MOVING), [Event::MotionStarted]);
     assert_eq!(events(MOVING, ENABLED), [Event::MotionFinished]);
     // A motion that a fault cut short did not come to its end.
@@ -180,19 +180,19 @@ fn enabling_with_a_bad_input_is_refused_and_names_it() {
             assert_eq!(refusal, Refusal::BadInput(interlock));
             assert!(refusal.to_string().starts_with(words), "{refusal}");
         }
-        // A latched fault is what a person is to hear of first.
+        // A latched fault is what a person is to learn first.
         let faulted = StageView {
             interlock: Some(interlock),
             ..FAULTED
         };
         let decision = decide(faulted, faulted, Some(Command::Enable));
-        let told = Event::Refused(Command::Enable, Refusal::FaultLatched);
-        assert_eq!(decision.events[4], Some(told));
+        let refused = Event::Refused(Command::Enable, Refusal::FaultLatched);
+        assert_eq!(decision.events[4], Some(refused));
     }
 }
 
 #[test]
-fn a_fault_that_only_held_the_axes_is_told_once() {
+fn a_fault_that_only_held_the_axes_is_reported_once() {
     let held = StageView {
         held: Some(FAULT),
         ..MOVING

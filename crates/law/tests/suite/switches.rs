@@ -32,7 +32,7 @@ fn every_input_has_the_bit_of_the_link_that_is_documented() {
 }
 
 #[test]
-fn a_union_has_what_either_has_also_where_both_have_it_and_a_difference_takes_only_what_is_there() {
+fn a_union_has_what_either_has_also_where_both_have_it_and_a_difference_takes_only_its_own_bits() {
     for one in EACH {
         for other in EACH {
             let both = one.with(other);

@@ -124,6 +124,7 @@ impl core::error::Error for UnknownChannel {}
 
 /// Largest number of signals of a source: the factor of its number.
 const SIGNALS_PER_SOURCE: u8 = 32;
+/// Number of the source that is the stage.
 const STAGE_SOURCE: u8 = 3;
 /// Units of a reference word in a count.
 const REFERENCE_UNITS: f64 = 256.0;
@@ -214,7 +215,7 @@ impl Channel {
         }
     }
 
-    /// The unit in which people read it, and how many of them its physical unit is: errors are told in um.
+    /// The unit in which people read it, and how many of them its physical unit is: errors are shown in um.
     pub const fn shown_unit(self) -> (&'static str, f64) {
         match self {
             Self::Axis(_, AxisSignal::Error) => ("um", 1e3),

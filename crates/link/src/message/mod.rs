@@ -3,7 +3,7 @@
 //! Every type bounds its size, and the largest message fits a frame
 //! ([`PAYLOAD_BYTES`](super::frame::PAYLOAD_BYTES)). The order of variants and fields **is** the wire format: what is new
 //! goes to the end of an enum, and any other change needs another [`PROTOCOL_VERSION`](super::PROTOCOL_VERSION). What a
-//! client needs to be told of another version never changes: the version byte, a request's number before its body,
+//! client needs to know of another version never changes: the version byte, a request's number before its body,
 //! `Response` as the first message, and `Version` as the first error.
 
 mod axis;
@@ -84,7 +84,7 @@ pub enum Body {
         /// Largest velocity, mm/s; above zero, at most the axis' limit.
         velocity_mm_s: f64,
     },
-    /// Moves one axis at a velocity until told otherwise, or until its host falls silent.
+    /// Moves one axis at a velocity until another command comes, or until its host falls silent.
     Jog {
         /// The axis.
         axis: AxisName,
@@ -111,7 +111,7 @@ pub enum Body {
     Inputs,
     /// Asks for what the axes have learnt. [`Reply::Learning`].
     Learning,
-    /// Tells the speed of the spindle, by which the vibration of a cut is cancelled.
+    /// Sets the speed of the spindle, by which the vibration of a cut is cancelled.
     Spindle {
         /// The speed, rpm, 0 to 1 000 000; zero if it stands.
         rpm: f64,

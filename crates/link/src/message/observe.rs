@@ -62,7 +62,7 @@ impl Words {
 /// `tick + k * decimation`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TelemetryBlock {
-    /// The selection's generation, as the acknowledgement of its request told.
+    /// The selection's generation, as in the acknowledgement of its request.
     pub generation: u8,
     /// Number of the first sample since the selection was made.
     pub sequence: u32,

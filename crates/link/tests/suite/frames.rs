@@ -49,7 +49,7 @@ fn no_frame_is_larger_than_the_largest_however_large_the_buffer() {
 }
 
 #[test]
-fn the_receiver_tells_good_damaged_and_overlong_frames_apart() {
+fn the_receiver_distinguishes_good_damaged_and_overlong_frames() {
     let good = framed(&Request {
         id: 1,
         body: Body::Status,
@@ -112,7 +112,7 @@ fn nothing_but_stopping_is_let_through_before_hello() {
     );
 }
 
-/// The frame of a request with another version's byte and, behind the number, whatever that version has.
+/// The frame of a request with another version's byte and, behind the number, what that version has.
 fn of_version(version: u8, id: u8, body: &[u8]) -> Vec<u8> {
     let payload = [&[version, id], body].concat();
     let crc = crc32fast::hash(&payload).to_le_bytes();

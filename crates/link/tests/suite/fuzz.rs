@@ -17,7 +17,7 @@ pub(crate) fn forged(payload: &[u8]) -> Vec<u8> {
     encoded
 }
 
-/// The stream as it is; behind it and a zero, a request that must be heard.
+/// The stream as it is; behind it and a zero, a request that must be received.
 pub(crate) fn stream(data: &[u8], mut serve: impl FnMut(Body) -> Result<Reply, LinkError>) {
     let mut port = LinkServer::new();
     drive(&mut port, data, &mut serve);

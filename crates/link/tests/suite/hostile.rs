@@ -1,4 +1,4 @@
-//! The link against a hostile or garbled stream: nothing panics, what was sent whole is heard, nothing else is.
+//! The link against a hostile or garbled stream: nothing panics, what was sent whole is received, nothing else is.
 
 use proptest::prelude::*;
 use quadrant_link::PROTOCOL_VERSION;
@@ -35,7 +35,7 @@ struct Tally {
     frames: u64,
     bytes: u64,
     intact: u64,
-    heard: u64,
+    received: u64,
     missed: u64,
     /// One trouble took away and another put back: a byte lost at the front, found at the end of the chunk before.
     restored: u64,
@@ -57,7 +57,7 @@ fn bad_line(seed: u64, frames: u64) -> Tally {
         tally.intact += expected as u64;
         for byte in arrival.bytes {
             port.push(byte, |body| {
-                tally.heard += 1;
+                tally.received += 1;
                 if body != arrival.request.body {
                     tally.slipped += 1;
                     tally.unintended_motions += u64::from(body.may_move());
@@ -74,16 +74,16 @@ fn bad_line(seed: u64, frames: u64) -> Tally {
     tally
 }
 
-fn assert_only_the_intact_were_heard(tally: &Tally) {
+fn assert_only_the_intact_were_received(tally: &Tally) {
     assert_eq!((tally.missed, tally.slipped), (0, 0), "{tally:?}");
     assert_eq!(tally.unintended_motions, 0, "{tally:?}");
-    assert_eq!(tally.heard, tally.intact + tally.restored, "{tally:?}");
+    assert_eq!(tally.received, tally.intact + tally.restored, "{tally:?}");
     assert!(tally.intact > tally.frames / 3, "{tally:?}");
 }
 
 #[test]
-fn over_a_bad_line_every_intact_request_is_heard_and_nothing_else() {
-    assert_only_the_intact_were_heard(&bad_line(1, 50_000));
+fn over_a_bad_line_every_intact_request_is_received_and_nothing_else() {
+    assert_only_the_intact_were_received(&bad_line(1, 50_000));
 }
 
 /// `cargo test -p quadrant-link --test suite ten_million -- --ignored --nocapture`
@@ -93,7 +93,7 @@ fn ten_million_frames_over_a_bad_line() {
     let start = std::time::Instant::now();
     let tally = bad_line(2, 10_000_000);
     println!("{tally:?} in {:.1} s", start.elapsed().as_secs_f64());
-    assert_only_the_intact_were_heard(&tally);
+    assert_only_the_intact_were_received(&tally);
 }
 
 /// The committed corpus of a fuzz target, which has some files.
@@ -173,12 +173,12 @@ proptest! {
         drive(&mut port, &garbage, |body| model.serve(body));
         drive(&mut port, &[frame::DELIMITER], |body| model.serve(body));
         let request = Request { id: 9, body: body(&mut Noise::new(seed)) };
-        let mut heard = None;
+        let mut received = None;
         let answers = drive(&mut port, &framed(&request), |body| {
-            heard = Some(body);
+            received = Some(body);
             Ok(Reply::Done)
         });
-        prop_assert_eq!(heard, Some(request.body));
+        prop_assert_eq!(received, Some(request.body));
         prop_assert_eq!(answers, vec![Response { id: 9, result: Ok(Reply::Done) }]);
     }
 

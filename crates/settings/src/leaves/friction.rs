@@ -76,7 +76,7 @@ pub(super) const LEAVES: &[LeafInfo] = &[
     number("feedforward.learning.vibration_mm_s", "mm/s", at(0.1), at(1000.0), LearningSettings::DEFAULT.vibration_mm_s,
         "Amplitude of the axis' vibration between 40 and 150 Hz, as a velocity, that halves the feedforward of all friction but the viscous."),
     number("feedforward.cancelling.spindle_rpm", "rpm", at(0.0), at(MOST_RPM), CancellingSettings::DEFAULT.spindle_rpm,
-        "Speed of the spindle until the link tells another; 0 if it stands. Left out with its part, no vibration is cancelled."),
+        "Speed of the spindle until the link sets another; 0 if it stands. Left out with its part, no vibration is cancelled."),
     number("feedforward.cancelling.ramp_rpm_s", "rpm/s", at(1.0), at(1e6), CancellingSettings::DEFAULT.ramp_rpm_s,
         "Largest rate at which cancelling follows a change of the spindle's speed."),
     number("feedforward.cancelling.teeth", "", at(1.0), at(64.0), CancellingSettings::DEFAULT.teeth as f64,

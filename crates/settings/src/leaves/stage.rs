@@ -94,9 +94,9 @@ pub(super) const AMPLIFIER_AND_PLANT: &[LeafInfo] = &exchanged(Exchange::Disable
     flag("amplifier.reversed",
         "True if a positive voltage moves the axis to smaller positions."),
     number("amplifier.continuous_v", "V", at(1e-3), at(20.0), 20.0,
-        "Output that the motor bears for ever; from the output limit on, the load is not watched."),
+        "Output that the motor withstands indefinitely; from the output limit on, the load is not watched."),
     number("amplifier.overload_s", "s", at(0.01), at(1e3), 2.0,
-        "Time for which the motor bears the output limit, after rest (I²t)."),
+        "Time for which the motor withstands the output limit, after rest (I²t)."),
     flag("commissioned",
         "True if the axis was commissioned, by the tool or by a person; outputs are enabled only if one was, and every other \
          has no gains, feedforward or offset."),

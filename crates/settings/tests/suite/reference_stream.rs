@@ -78,8 +78,9 @@ fn play<S: Scalar>(segments: &[Segment]) -> (Vec<ReferenceSample<S>>, bool) {
     }
 }
 
-/// One turn of a circle from rest to rest in `SECONDS`: position, velocity and acceleration of both axes.
+/// Radius of the circle, mm. Its motion is one turn from rest to rest.
 const RADIUS_MM: f64 = 20.0;
+/// Time of this turn, s.
 const SECONDS: f64 = 4.0;
 fn circle(time_s: f64) -> [[f64; 3]; 2] {
     let share = time_s / SECONDS;

@@ -155,7 +155,7 @@ fn a_list_is_one_value_and_makes_itself() {
 }
 
 #[test]
-fn what_is_no_setting_is_told_from_what_holds_several() {
+fn what_is_no_setting_is_distinguished_from_what_holds_several() {
     let mut settings = StageSettings::simulated();
     for path in [
         "",

@@ -1,7 +1,7 @@
 //! Two masses and the gap between them, a step at a time.
 //!
 //! Contact is stepped by the implicit midpoint rule, which keeps the energy of spring and masses and takes out what the
-//! damper does; a step in which the gap closes is cut where it does. So the gap never gives energy, whatever the step.
+//! damper does; a step in which the gap closes is cut where it does. So the gap never gives energy, at a step of any length.
 
 use super::Backlash;
 

@@ -34,7 +34,7 @@ pub struct SettingsFile {
     pub stage: StageSettings,
 }
 
-/// One command that had a hand in the settings.
+/// One command that changed the settings.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {

@@ -1,4 +1,4 @@
-//! Settings that a file leaves out: they are the defaults. Reading lays the file over the defaults; writing drops what equals them.
+//! Settings that a file leaves out: they are the defaults. Reading replaces defaults by the file's values; writing drops what equals them.
 //!
 //! A part that a stage has by default only if it is named (`nonlinear`, `homing`, `plant`) begins at its own defaults where a file names it.
 
@@ -17,11 +17,13 @@ use super::error::{self, SettingsFileError};
 use crate::setting_value::meant;
 use crate::toml_file::TomlFileError;
 
-/// Keys of a file beside the settings.
+/// Key of a file's form.
 const FORM: &str = "form";
+/// Key of a file's provenance.
 const PROVENANCE: &str = "provenance";
-/// Keys of the settings of the stage, and of its axes below it.
+/// Key of the settings of the stage.
 const STAGE: &str = "stage";
+/// Key of the settings of its axes, below it.
 const AXES: &str = "axes";
 
 /// The settings that a file of this control rate may leave out: [`StageSettings::default`], with a filter of the derivative that

@@ -33,8 +33,9 @@ const TRAVEL_MM: [f64; 2] = [-200.0, 200.0];
 pub const LIMIT_BEYOND_MM: f64 = 5.0;
 /// Share of the way to the negative end at which the home switch is.
 const HOME_SHARE: f64 = 0.2;
-/// Share of the screw's lead by which an index pulse is beside it, and of the travel that this is at most.
+/// Distance of an index pulse from the home switch, over the screw's lead.
 const INDEX_SHARE: f64 = 0.4;
+/// Largest such distance over the travel.
 const INDEX_TRAVEL_SHARE: f64 = 0.1;
 /// Least counts between two index pulses, as settings allow them.
 const LEAST_INDEX_COUNTS: i64 = 16;
@@ -48,13 +49,14 @@ const MOST_PRESLIDING_HZ: f64 = 3000.0;
 const TEETH_HZ: f64 = 500.0;
 /// Breakaway level over the Coulomb level where one of them is left out.
 const BREAKAWAY_RATIO: f64 = 1.25;
-/// Way before a model without pre-sliding breaks away, um, and frequency that the mass has on it at most, Hz: short, and not none, for a
-/// force that steps with the direction holds no mass at rest.
+/// Way before a model without pre-sliding breaks away, um: not zero, since a force that steps with the direction holds no mass at
+/// rest.
 const STIFF_UM: f64 = 1.0;
+/// Highest frequency of the mass on that way, Hz.
 const STIFF_HZ: f64 = 600.0;
-/// Slope at which pre-sliding friction begins, over level and way: that of the simulated stage's virgin curve, and that of a bristle, which
-/// reaches 95 % of its level after three times level over stiffness.
+/// Slope at which pre-sliding friction of the simulated stage begins, over level and way.
 const VIRGIN_SLOPE: f64 = 4.0;
+/// The same slope of a bristle, which reaches 95 % of its level after three times level over stiffness.
 const BRISTLE_SLOPE: f64 = 3.0;
 /// Counts in a second that a counter follows: the firmware takes 4096 in a tick at 10 kHz.
 const MOST_COUNTS_PER_S: f64 = 4e7;

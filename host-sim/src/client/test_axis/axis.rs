@@ -25,10 +25,11 @@ use crate::record::Recording;
 
 /// Time from one look at the telemetry to the next.
 const LOOK: Duration = Duration::from_millis(50);
-/// Time recorded after the motion, so that the last block has come: a block takes time to fill, and the server runs every so many ticks.
+/// Least time recorded after the motion, so that the last block has come.
 const TAIL: Duration = Duration::from_millis(30);
+/// The same in control ticks: a block takes time to fill, and the server runs every few ticks.
 const TAIL_TICKS: f64 = 300.0;
-/// Time for whatever moves to come to rest before an experiment.
+/// Time for a moving axis to come to rest before an experiment.
 const BEFORE: Duration = Duration::from_secs(60);
 /// Faults that end an experiment, and no more.
 const ENDS_EXPERIMENTS: [FaultCode; 3] = [
@@ -108,8 +109,8 @@ impl<'a> ConnectedAxis<'a> {
         ]
         .map(|signal| Channel::Axis(Translated::translated(self.axis), signal));
         let rate_hz = self.client.identity().rate_hz;
-        let wanted = u16::try_from(experiment.decimation).unwrap_or(u16::MAX);
-        let least = wanted.max(least_decimation(channels.len(), rate_hz));
+        let requested = u16::try_from(experiment.decimation).unwrap_or(u16::MAX);
+        let least = requested.max(least_decimation(channels.len(), rate_hz));
         let every = if experiment.injection_v.is_empty() {
             least
         } else {

@@ -59,7 +59,7 @@ impl Injection {
         }
     }
 
-    /// Sends all values as fast as the machine has room for them, and keeps what it tells meanwhile.
+    /// Sends all values as fast as the machine has room for them, and keeps what it reports meanwhile.
     pub(super) fn send(
         &mut self,
         client: &mut Client,

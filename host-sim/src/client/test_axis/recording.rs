@@ -7,8 +7,9 @@ use super::stop::Injected;
 use crate::client::samples::Samples;
 use crate::record::Recording;
 
-/// Units of a reference word in a count, and counts after which it wraps.
+/// Units of a reference word in a count.
 const UNITS_PER_COUNT: f64 = 256.0;
+/// Counts after which a reference word wraps.
 const REFERENCE_RANGE: f64 = 16_777_216.0;
 
 /// Data of an experiment beside its samples of reference, position and sum of codes.

@@ -36,7 +36,7 @@ fn what_is_dumped_is_what_the_machine_has() {
 }
 
 #[test]
-fn what_acts_is_read_beside_a_draft_that_has_more_and_less() {
+fn settings_in_force_are_read_beside_a_draft_that_has_more_and_less() {
     let (mut client, bench) = connected();
     bench.borrow_mut().in_force.axes[1].plant = None;
     let acts = bench.borrow().in_force.clone();
@@ -72,15 +72,15 @@ fn a_test_of_an_axis_does_not_write_over_what_is_edited() {
 }
 
 #[test]
-fn what_is_loaded_is_what_acts_parts_and_lists_included() {
+fn loaded_settings_are_in_force_parts_and_lists_included() {
     let (mut client, bench) = connected();
-    let mut wanted = StageSettings::simulated();
-    wanted.axes[0].feedback.law = LawKind::Pid;
-    wanted.axes[0].feedback.nonlinear = None;
-    wanted.axes[1].plant = None;
-    wanted.axes[1].feedback.pid.kp_v_per_mm = 1.0 / 3.0;
-    let loaded = settings::load(&mut client, &wanted).unwrap();
-    assert_eq!(bench.borrow().in_force, wanted);
+    let mut requested = StageSettings::simulated();
+    requested.axes[0].feedback.law = LawKind::Pid;
+    requested.axes[0].feedback.nonlinear = None;
+    requested.axes[1].plant = None;
+    requested.axes[1].feedback.pid.kp_v_per_mm = 1.0 / 3.0;
+    let loaded = settings::load(&mut client, &requested).unwrap();
+    assert_eq!(bench.borrow().in_force, requested);
     let changed = [message::AxisName::X, message::AxisName::Y]
         .into_iter()
         .collect::<AxisSet>();

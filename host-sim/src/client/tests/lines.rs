@@ -64,7 +64,7 @@ fn a_socket_carries_a_session() {
 }
 
 #[test]
-fn a_machine_that_hangs_up_is_told_with_its_address() {
+fn a_machine_that_hangs_up_is_reported_with_its_address() {
     let (address, server) = behind_a_socket(2);
     let mut client = Client::open(TcpTransport::connect(&address).unwrap()).unwrap();
     client.status().unwrap();
@@ -74,7 +74,7 @@ fn a_machine_that_hangs_up_is_told_with_its_address() {
 }
 
 #[test]
-fn one_program_at_a_time_talks_to_a_machine_and_another_is_told_which() {
+fn one_program_at_a_time_talks_to_a_machine_and_another_learns_which() {
     let (address, server) = behind_a_socket(usize::MAX);
     let mut client = Client::open(TcpTransport::connect(&address).unwrap()).unwrap();
     // A lock is a file's: another opening of it stands for another program.

@@ -182,14 +182,14 @@ fn a_program_arrives_whole_in_order_and_ends_at_rest() {
     let points = set_points(&trajectory, 1e4, 20, [10.0, 0.0, -1.0]);
     bench.borrow_mut().noise = vec![0, 3, 0];
     bench.borrow_mut().lose_answers = 0;
-    let mut told = 0;
+    let mut reported = 0;
     stream(&mut client, &points, 20, &mut |_, sent| {
-        assert!(sent >= told);
-        told = sent;
+        assert!(sent >= reported);
+        reported = sent;
         Ok(())
     })
     .unwrap();
-    assert_eq!(told, points.len());
+    assert_eq!(reported, points.len());
     assert_eq!(bench.borrow().points, points);
     let last = points.last().unwrap();
     let expected = trajectory.point(&trajectory.places(1e4).last().unwrap());

@@ -18,7 +18,7 @@ fn count(requests: &[&str], name: &str) -> usize {
 }
 
 #[test]
-fn a_session_tells_who_the_machine_is() {
+fn a_session_names_its_machine() {
     let (client, _) = connected();
     assert_eq!(client.identity().board, "model");
     assert_eq!(client.endpoint(), "the simulated machine");
@@ -52,7 +52,7 @@ fn a_request_that_may_be_repeated_survives_lost_answers() {
 
 /// It would end the motion of a host that is silent for half a second.
 #[test]
-fn a_machine_that_is_long_at_an_answer_hears_its_host_if_that_moves_it() {
+fn a_machine_that_is_long_at_an_answer_still_gets_requests_of_its_host_if_that_moves_it() {
     let (mut client, bench) = connected();
     let apply = |client: &mut Client| {
         bench.borrow_mut().answer_after_ms = 2000;
@@ -136,7 +136,7 @@ fn a_busy_machine_is_asked_again() {
 }
 
 #[test]
-fn a_restart_is_told_to_whoever_wanted_a_motion_and_not_to_a_question() {
+fn a_restart_is_reported_to_a_request_for_motion_and_not_to_a_question() {
     let (mut client, bench) = connected();
     client.order(Body::Enable).unwrap();
     bench.borrow_mut().restart = true;
@@ -242,7 +242,7 @@ impl Transport for Parrot {
 }
 
 #[test]
-fn another_version_of_the_protocol_is_told_in_words() {
+fn another_version_of_the_protocol_is_reported_in_words() {
     // The answer of a firmware of version 7: the frame's own version byte, and the error that never changes.
     let message = Message::Response(Response {
         id: 1,

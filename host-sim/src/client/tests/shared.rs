@@ -9,8 +9,8 @@ use super::model::Model;
 use crate::client::{Client, ClientError};
 use crate::machine::{Loopback, MOST_VIEWERS, Shared, TcpTransport};
 
-/// Longest time in which a viewer is told what its holder knows.
-const TOLD: Duration = Duration::from_secs(5);
+/// Longest time in which a viewer receives what its holder knows.
+const NOTICE_TIME: Duration = Duration::from_secs(5);
 
 fn look(address: &str) -> Client {
     Client::open(TcpTransport::look(address, None).unwrap()).unwrap()
@@ -36,7 +36,7 @@ fn order(
 }
 
 #[test]
-fn others_see_what_the_holder_hears_and_may_only_stop() {
+fn others_see_what_the_holder_receives_and_may_only_stop() {
     let (model, bench) = Model::new();
     let shared = Shared::listen(Loopback::new(model), "127.0.0.1:0").unwrap();
     let address = shared.address().to_string();
@@ -69,8 +69,8 @@ fn others_see_what_the_holder_hears_and_may_only_stop() {
         })
         .unwrap();
     holder.wait(Duration::from_millis(500)).unwrap();
-    let told = viewers[1].notice(TOLD).unwrap();
-    assert!(told.is_some(), "no event came");
+    let notice = viewers[1].notice(NOTICE_TIME).unwrap();
+    assert!(notice.is_some(), "no event came");
 
     for body in [Body::Stop, Body::Disable] {
         let name = body.name();
@@ -83,7 +83,7 @@ fn others_see_what_the_holder_hears_and_may_only_stop() {
 }
 
 #[test]
-fn a_viewer_whose_holder_is_busy_is_told_that_nothing_was_done_and_nothing_is_done_later() {
+fn a_viewer_whose_holder_is_busy_learns_that_nothing_was_done_and_nothing_is_done_later() {
     let (model, bench) = Model::new();
     let shared = Shared::listen(Loopback::new(model), "127.0.0.1:0").unwrap();
     let address = shared.address().to_string();

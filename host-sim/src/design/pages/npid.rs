@@ -284,7 +284,7 @@ impl NonlinearPage {
             sections: vec![
                 section(
                     "stability",
-                    "How much gain the loop bears",
+                    "How much gain the loop allows",
                     "Popov's criterion proves every gain that depends on the error alone. A gain that may also vary with time is proven by \
                      the circle criterion, up to a smaller bound; between the two a search over switching gains looks for instability.",
                     vec![

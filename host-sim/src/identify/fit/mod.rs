@@ -2,7 +2,7 @@
 //!
 //! Levenberg-Marquardt does the minimisation; bounds are met by MINUIT's sine transformation, outliers by reweighting
 //! with Huber's weights (Huber and Ronchetti, *Robust Statistics*, 2nd ed., 2009). Standard errors come from the
-//! Jacobian at the optimum: they hold for independent residuals; whoever has correlated ones thins or whitens them first.
+//! Jacobian at the optimum: they hold for independent residuals; a caller with correlated ones thins or whitens them first.
 
 use std::fmt;
 

@@ -82,7 +82,7 @@ fn a_bound_holds_and_is_reported() {
 }
 
 #[test]
-fn parameters_that_the_data_hardly_tell_apart_are_seen_to_be_correlated() {
+fn parameters_that_the_data_hardly_distinguish_are_seen_to_be_correlated() {
     let data = decay(0.01, 1);
     let slope = Parameter {
         name: "slope",

@@ -104,11 +104,13 @@ const SETTLING_S: f64 = 0.7;
 const SHORT_SETTLING_S: f64 = 0.4;
 /// Periods in a block.
 const BLOCK_PERIODS: usize = 2;
-/// Acceleration and jerk of the passes.
+/// Acceleration of the passes, mm/s^2.
 const ACCELERATION_MM_S2: f64 = 500.0;
+/// Jerk of the passes, mm/s^3.
 const JERK_MM_S3: f64 = 2e4;
-/// Travel either way below which both sides are used and periods are shorter by a factor, mm.
+/// Travel either way below which both sides are used and periods are shorter, mm.
 const SHORT_MM: f64 = 60.0;
+/// Factor on the period there.
 const SHORT_PERIOD: f64 = 0.5;
 /// Slowest pass that is chosen for a short travel, mm/s.
 const SLOWEST_MM_S: f64 = 0.5;
@@ -196,7 +198,7 @@ impl FrfSettings {
     }
 }
 
-/// Measures the response of the test_axis's axis, under the settings that are in force.
+/// Measures the response of the axis under test, under the settings that are in force.
 ///
 /// # Errors
 /// Settings that cannot be, too little travel, or a run that is stopped.
@@ -216,12 +218,12 @@ pub fn measure(
         let (experiment, expected) = if moves {
             let direction = if forward { 1.0 } else { -1.0 };
             // A new realisation in every pass: what depends on the signal (leakage, friction) then scatters, and is seen.
-            let mut anew = *settings;
-            anew.excitation.seed = settings
+            let mut varied = *settings;
+            varied.excitation.seed = settings
                 .excitation
                 .seed
                 .wrapping_add(recordings.len() as u64);
-            pass(&anew, axis.travel_mm, axis.rate_hz, missing, direction)?
+            pass(&varied, axis.travel_mm, axis.rate_hz, missing, direction)?
         } else {
             (standstill(settings, axis.rate_hz), settings.periods)
         };
@@ -425,7 +427,7 @@ fn check_sliding(
         .windows(span + 1)
         .map(|window| along * (window[span] - window[0]) / (span as f64 * recording.sample_time_s))
         .fold(f64::INFINITY, f64::min);
-    if least_mm_s < LEAST_SPEED * bias.abs() {
+    if least_mm_s < MIN_SPEED_RATIO * bias.abs() {
         return Err(FrfError::NotSliding {
             velocity_mm_s: bias.abs(),
             least_mm_s,
@@ -435,11 +437,12 @@ fn check_sliding(
     Ok(())
 }
 
-/// Time over which the velocity is taken, s, at least, and that in which the bias moves by so many counts of the encoder: a noise of a count
-/// is no standstill then; and the share of the bias that it may fall to.
+/// Least time over which the velocity is taken, s.
 const SPEED_S: f64 = 2e-3;
+/// Counts that the bias moves in this time at least: a noise of one count is no standstill then.
 const SPEED_COUNTS: f64 = 12.0;
-const LEAST_SPEED: f64 = 0.25;
+/// Least velocity over the bias: below it, the axis does not slide.
+const MIN_SPEED_RATIO: f64 = 0.25;
 
 /// Samples over which the reference's velocity is looked at.
 const STEADY_SAMPLES: usize = 100;

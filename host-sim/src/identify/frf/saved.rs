@@ -55,22 +55,22 @@ pub enum SavedError {
 
 /// Periods in a block: the window then leaves the lines of a periodic excitation apart.
 const BLOCK_PERIODS: usize = 2;
-/// Fewest samples of a period.
+/// Fewest samples in a period.
 const LEAST_PERIOD: usize = 16;
-/// Power of the injection at an excited line at least, of that at the strongest: 60 dB.
-const EXCITED: f64 = 1e-6;
-/// Power between the lines of the period, of that at them, from which on the excitation is not periodic.
-const APERIODIC: f64 = 1e-3;
+/// Least power of the injection at an excited line, over the power at the strongest one: -60 dB.
+const MIN_LINE_POWER: f64 = 1e-6;
+/// Largest power between the lines of the period, over the power at them, of a periodic excitation.
+const MAX_APERIODIC_POWER: f64 = 1e-3;
 /// Voltage beyond the injection, V RMS, from which on a feedback law was at work: some steps of a 16-bit converter.
 const FEEDBACK_V: f64 = 1e-3;
 /// Time over which the reference's velocity is looked at, s.
 const VELOCITY_S: f64 = 0.01;
-/// Deviation of the reference from its steady velocity, of that velocity.
-const STEADY: f64 = 1e-3;
+/// Largest deviation of the reference from its steady velocity, over that velocity.
+const MAX_VELOCITY_DEVIATION: f64 = 1e-3;
 /// Velocity below which the reference stands still, mm/s.
 const STANDSTILL_MM_S: f64 = 1e-3;
-/// Deviation of a time step from the first, of it.
-const UNEVEN: f64 = 1e-3;
+/// Largest deviation of a time step from the first, over the first.
+const MAX_STEP_DEVIATION: f64 = 1e-3;
 
 /// Estimates the response of recordings made alike: the same axis, law, excitation and, but for its sign, velocity.
 ///
@@ -126,7 +126,7 @@ pub fn response_of(
 fn check(recordings: &[Recording], settings: &SavedSettings) -> Result<f64, SavedError> {
     let sample_time_s = recordings.first().map_or(f64::NAN, |r| r.sample_time_s);
     for (index, recording) in recordings.iter().enumerate() {
-        if (recording.sample_time_s / sample_time_s - 1.0).abs() > UNEVEN {
+        if (recording.sample_time_s / sample_time_s - 1.0).abs() > MAX_STEP_DEVIATION {
             return Err(SavedError::SampleTime {
                 index: index + 1,
                 found_s: recording.sample_time_s,
@@ -209,7 +209,7 @@ fn steady_range(
     }
     let (mut best, mut start) = (0..0, 0);
     for (index, velocity) in velocities.iter().enumerate() {
-        if (velocity.abs() - fastest).abs() > STEADY * fastest {
+        if (velocity.abs() - fastest).abs() > MAX_VELOCITY_DEVIATION * fastest {
             start = index + 1;
         } else if index + 1 - start > best.len() {
             best = start..index + 1;
@@ -219,8 +219,8 @@ fn steady_range(
     (best.start + settling).min(best.end)..best.end
 }
 
-/// Blocks that are transformed at once.
-const AT_ONCE: usize = 32;
+/// Number of blocks that are transformed at a time.
+const BLOCKS_AT_A_TIME: usize = 32;
 
 /// The lines of a block in the band at which the injection has power, away from what its window spreads.
 fn excited_lines(
@@ -231,8 +231,8 @@ fn excited_lines(
 ) -> Vec<usize> {
     let transform = Transform::new(length);
     let mut power = vec![0.0; length / 2];
-    // A few at a time, as an hour's recording has thousands of blocks; summed up in their order, whatever the threads.
-    for some in blocks.chunks(AT_ONCE) {
+    // A few at a time, as an hour's recording has thousands of blocks; summed up in their order, so that the number of threads does not matter.
+    for some in blocks.chunks(BLOCKS_AT_A_TIME) {
         let powers: Vec<Vec<f64>> = some
             .par_iter()
             .map_init(
@@ -261,10 +261,10 @@ fn excited_lines(
         .clone()
         .fold(0.0_f64, |most, line| most.max(power[line]));
     let excited: Vec<usize> = lines
-        .filter(|&line| most > 0.0 && power[line] > EXCITED * most)
+        .filter(|&line| most > 0.0 && power[line] > MIN_LINE_POWER * most)
         .collect();
     let sum = |offset: usize| -> f64 { excited.iter().map(|line| power[line - offset]).sum() };
-    if sum(1) < APERIODIC * sum(0) || excited.len() < 3 {
+    if sum(1) < MAX_APERIODIC_POWER * sum(0) || excited.len() < 3 {
         return excited;
     }
     // At the edges of its band a random excitation leaks from one side only.

@@ -15,13 +15,13 @@ pub enum MotionFitError {
     TooShort { rows: usize },
     /// It moves one way only.
     #[error(
-        "only {percent:.1} % of the record moves in one of the directions: friction and offset cannot be told apart without motion both \
+        "only {percent:.1} % of the record moves in one of the directions: friction and offset cannot be separated without motion both \
          ways, {LEAST_PERCENT} % at least"
     )]
     OneWay { percent: f64 },
     /// It holds too little of something.
     #[error(
-        "the record does not tell the parameters of \"{structure}\" apart: it needs several velocities, accelerations and reversals"
+        "the record does not separate the parameters of \"{structure}\": it needs several velocities, accelerations and reversals"
     )]
     Dependent { structure: String },
     /// The fit makes no sense of mass or friction.

@@ -42,7 +42,7 @@ impl Candidate {
 
 /// The largest error that is as good as another.
 fn as_good_as(error: f64) -> f64 {
-    (AS_GOOD * error).max(error + AS_GOOD_SHARE)
+    (EQUAL_ERROR_RATIO * error).max(error + EQUAL_ERROR_SHARE)
 }
 
 /// Relative errors of a model. About a reversal one without pre-sliding is wrong for the time that the axis sticks, which says little
@@ -84,16 +84,16 @@ pub struct Rows {
 const PARTS: usize = 8;
 /// Reversals below which nothing is withheld.
 const LEAST_REVERSALS: usize = 3;
-/// Errors, over the smallest, up to which a model is as good as the best: the simplest of them is recommended.
-const AS_GOOD: f64 = 1.02;
+/// Largest error over the smallest of a model that is as good as the best: the simplest of them is recommended.
+const EQUAL_ERROR_RATIO: f64 = 1.02;
 /// The same as a share of the voltage that is left unexplained beyond the smallest: less does not distinguish models.
-const AS_GOOD_SHARE: f64 = 1.5e-3;
-/// Errors on all rows, over the smallest, from which on a model is contradicted by reversals.
-const CONTRADICTED: f64 = 3.0;
-/// Validation errors, over the smallest, up to which a model's parameters count as another opinion.
-const ANOTHER_OPINION: f64 = 2.0;
+const EQUAL_ERROR_SHARE: f64 = 1.5e-3;
+/// Least error on all rows, over the smallest, of a model that reversals contradict.
+const CONTRADICTION_RATIO: f64 = 3.0;
+/// Largest validation error, over the smallest, of a model whose parameters widen the standard errors of the others.
+const RIVAL_ERROR_RATIO: f64 = 2.0;
 
-/// Fits every structure of [`Structure::ALL`] to a record; `progress` is told the share that is done. A structure whose
+/// Fits every structure of [`Structure::ALL`] to a record; `progress` receives the share that is done. A structure whose
 /// parameters the record does not determine, or whose mass or friction is below zero, is no candidate.
 ///
 /// A parameter's standard error covers the record's noise, what the value becomes with parts of the trajectory withheld, and
@@ -132,12 +132,12 @@ pub fn fit_motion(
     if let Some(error) = reason.filter(|_| candidates.is_empty()) {
         return Err(error);
     }
-    heed_other_opinions(&mut candidates);
+    widen_by_other_models(&mut candidates);
     Ok(candidates)
 }
 
 /// Widens each standard error by the distance to the same parameter of the other good models.
-fn heed_other_opinions(candidates: &mut [Candidate]) {
+fn widen_by_other_models(candidates: &mut [Candidate]) {
     let best = candidates
         .iter()
         .filter_map(|candidate| candidate.validation_error)
@@ -147,7 +147,7 @@ fn heed_other_opinions(candidates: &mut [Candidate]) {
         .filter(|candidate| {
             candidate
                 .validation_error
-                .is_some_and(|error| error <= ANOTHER_OPINION * best)
+                .is_some_and(|error| error <= RIVAL_ERROR_RATIO * best)
         })
         .map(|candidate| candidate.model.estimates.clone())
         .collect();
@@ -253,17 +253,18 @@ fn repetition(position_mm: &[f64]) -> Option<usize> {
     };
     // Neighbours are alike, too: a repetition is a likeness after a difference.
     let longest = (LONGEST_REPETITION * count as f64) as usize;
-    let unlike = (1..longest).find(|&lag| differs(lag) > UNLIKE)?;
-    let alike = (unlike..longest).find(|&lag| differs(lag) < ALIKE)?;
-    let until = (alike..longest).find(|&lag| differs(lag) >= ALIKE);
+    let unlike = (1..longest).find(|&lag| differs(lag) > MIN_DIFFERENCE)?;
+    let alike = (unlike..longest).find(|&lag| differs(lag) < MAX_REPETITION_DIFFERENCE)?;
+    let until = (alike..longest).find(|&lag| differs(lag) >= MAX_REPETITION_DIFFERENCE);
     (alike..until.unwrap_or(longest)).min_by(|a, b| differs(*a).total_cmp(&differs(*b)))
 }
 
-/// A repetition takes at most this share of the record: more is not seen twice.
+/// Largest length of a repetition over that of the record: a longer one does not occur twice.
 const LONGEST_REPETITION: f64 = 0.6;
-/// RMS differences of a trajectory and itself, later, over its standard deviation: it is another place, or the same.
-const UNLIKE: f64 = 0.2;
-const ALIKE: f64 = 0.02;
+/// Least RMS difference of a trajectory and itself, later, over its standard deviation, at another place.
+const MIN_DIFFERENCE: f64 = 0.2;
+/// Largest such difference at the same place.
+const MAX_REPETITION_DIFFERENCE: f64 = 0.02;
 
 fn candidate(
     signals: &Signals,
@@ -378,7 +379,7 @@ fn simplest<'a>(candidates: &'a [Candidate], errors: &[Option<Errors>]) -> Optio
     };
     let most_sliding = as_good_as(smallest(|errors| errors.sliding));
     let least = smallest(|errors| errors.all);
-    let most = (CONTRADICTED * least).max(as_good_as(least));
+    let most = (CONTRADICTION_RATIO * least).max(as_good_as(least));
     let mut good = candidates
         .iter()
         .zip(errors)
@@ -397,7 +398,7 @@ struct Withheld {
     errors: Errors,
 }
 
-/// Withholds each part in turn; nothing if what is left tells too little.
+/// Withholds each part in turn; nothing if what is left determines too little.
 fn withheld(
     regression: &Regression<'_>,
     structure: Structure,
@@ -411,7 +412,7 @@ fn withheld(
         slides[row] = true;
     }
     let mut solutions = Vec::new();
-    // Summed up in their order, whatever the threads.
+    // Summed up in their order, so that the number of threads does not matter.
     let found: Vec<(Vec<usize>, Result<Solution, MotionFitError>)> = (0..PARTS)
         .into_par_iter()
         .map(|part| {
@@ -481,7 +482,7 @@ fn elsewhere<'a>(
 }
 
 /// Ranges of the coefficients in a refinement, over their values; of those that may be of either sign, over the Coulomb level.
-const REFINED_WITHIN: f64 = 0.3;
+const REFINED_RANGE: f64 = 0.3;
 /// Time between the positions that a refinement compares, s.
 const REFINED_EVERY_S: f64 = 0.025;
 /// Step of its difference quotients, of a coefficient's range: friction's corners make the simulation rough.
@@ -512,10 +513,10 @@ pub fn refined(
         .zip(solution.coefficients.iter())
         .map(|(term, value)| match term {
             Term::Inertia | Term::Viscous(_) | Term::Coulomb | Term::Element(_) => {
-                REFINED_WITHIN * value.abs()
+                REFINED_RANGE * value.abs()
             }
             Term::Drop | Term::Offset | Term::Drift(_) | Term::AlongTravel(_) => {
-                REFINED_WITHIN * coulomb_v
+                REFINED_RANGE * coulomb_v
             }
         })
         .collect();
@@ -563,7 +564,7 @@ pub fn refined(
         shifted(&found.values),
         &[],
     )?;
-    // What the data tell of a parameter is what the force told.
+    // The data determine a parameter as well as they determine the force.
     for (estimate, before) in found.model.estimates.iter_mut().zip(&model.estimates) {
         estimate.standard_error = before.standard_error;
     }

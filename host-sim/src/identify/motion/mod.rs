@@ -12,7 +12,7 @@
 //! position. Velocity and acceleration come from the position alone, by zero-phase filtering and central differences; what
 //! the filter does to the edges is cut, and all signals, the regressors among them, pass the same decimation filter.
 //!
-//! What such a record cannot tell: an amplifier's offset, gravity, and a Coulomb friction that differs between the senses
+//! What such a record cannot separate: an amplifier's offset, gravity, and a Coulomb friction that differs between the senses
 //! of motion are one and the same; so are viscous friction and linear damping (sigma here holds `B / A`).
 //!
 //! Source: Janot, Gautier and Brunot, *Data Set and Reference Models of EMPS*, 2019; Gautier, *Dynamic identification of

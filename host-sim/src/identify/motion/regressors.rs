@@ -61,7 +61,7 @@ impl Term {
 }
 
 /// Stribeck velocities whose columns are kept.
-const LATEST: usize = 16;
+const KEPT_VELOCITIES: usize = 16;
 
 /// The regression of one record: its columns but for those that depend on the Stribeck velocity.
 #[derive(Debug)]
@@ -160,7 +160,7 @@ impl<'a> Regression<'a> {
             settings,
             terms,
             columns: Arc::new(DMatrix::from_columns(&columns)),
-            latest: Latest::new(LATEST),
+            latest: Latest::new(KEPT_VELOCITIES),
             hysteresis,
             voltage_v: signals.smoothed(&signals.voltage_v, settings),
             velocity_mm_s: signals.decimated(velocity, settings),
@@ -186,8 +186,8 @@ impl<'a> Regression<'a> {
     pub(super) fn sliding_rows(&self, moving_mm_s: f64) -> Vec<usize> {
         let velocity = &self.velocity_mm_s;
         let slides = |row: &usize| {
-            let begin = row.saturating_sub(ABOUT_ROWS);
-            let about = &velocity[begin..velocity.len().min(row + ABOUT_ROWS + 1)];
+            let begin = row.saturating_sub(FILTER_ROWS);
+            let about = &velocity[begin..velocity.len().min(row + FILTER_ROWS + 1)];
             about
                 .iter()
                 .all(|v| v * velocity[*row].signum() > moving_mm_s)
@@ -238,7 +238,7 @@ impl<'a> Regression<'a> {
 }
 
 /// Rows either side of one that the decimation's filter mixes with it.
-const ABOUT_ROWS: usize = 3;
+const FILTER_ROWS: usize = 3;
 
 /// The force of an element of unit level that slips at `knot_mm`, driven by a position, -1 to 1.
 fn maxwell_slip(position_mm: &[f64], knot_mm: f64) -> Vec<f64> {
@@ -319,7 +319,7 @@ impl<'a> Solver<'a> {
         Some(made)
     }
 
-    /// The coefficients that explain a voltage best; nothing, if some columns cannot be told apart.
+    /// The coefficients that explain a voltage best; nothing, if some columns cannot be distinguished.
     pub(super) fn solve(
         &self,
         columns: &Arc<DMatrix<f64>>,
@@ -334,7 +334,7 @@ impl<'a> Solver<'a> {
             let rotated = rotated.rows(0, kept.len()).into_owned();
             let triangle = &decomposed.triangle;
             let smallest = triangle.singular_values.min();
-            if smallest < DEPENDENT * triangle.singular_values.max() {
+            if smallest < DEPENDENCE_RATIO * triangle.singular_values.max() {
                 return None;
             }
             let solution = triangle.solve(&rotated, 0.0).ok()?;
@@ -362,5 +362,5 @@ impl<'a> Solver<'a> {
 /// Decompositions that are kept: those of two Stribeck velocities, each with up to seven elements left out.
 const DECOMPOSITIONS: usize = 16;
 
-/// Smallest over largest singular value of the scaled columns below which some cannot be told apart.
-const DEPENDENT: f64 = 1e-9;
+/// Largest ratio of the smallest to the largest singular value of scaled columns that count as dependent.
+const DEPENDENCE_RATIO: f64 = 1e-9;

@@ -11,17 +11,23 @@ const VELOCITIES_MM_S: [f64; 6] = [5.0, 80.0, 10.0, 40.0, 20.0, 120.0];
 const LENGTH_MM: f64 = 60.0;
 /// Longest time of a move, s.
 const LONGEST_S: f64 = 2.0;
-/// Share of the travel either way that a move takes, and of the velocity limit; shortest time of a move, s.
+/// Length of a move over the travel either way.
 const TRAVEL_SHARE: f64 = 0.8;
+/// Velocity of a move over the velocity limit.
 const VELOCITY_SHARE: f64 = 0.8;
+/// Shortest time of a move, s.
 const SHORTEST_S: f64 = 0.2;
-/// Acceleration and jerk of the moves.
+/// Acceleration of the moves, mm/s^2.
 const ACCELERATION_MM_S2: f64 = 1500.0;
+/// Jerk of the moves, mm/s^3.
 const JERK_MM_S3: f64 = 5e4;
-/// The sine: its inertia is felt while it slides, away from the reversals.
+/// Amplitude of the sine, mm: its inertia is felt while it slides, away from the reversals.
 const SINE_AMPLITUDE_MM: f64 = 20.0;
+/// Largest velocity of the sine, mm/s.
 const SINE_VELOCITY_MM_S: f64 = 180.0;
+/// Cycles of the sine.
 const SINE_CYCLES: f64 = 8.0;
+/// Lead-in and lead-out of the sine, s.
 const SINE_LEAD_S: f64 = 0.5;
 
 /// Moves the axis under the settings in force, `rounds` times, and joins the recordings.

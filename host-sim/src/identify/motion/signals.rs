@@ -16,7 +16,7 @@ pub struct MotionFitSettings {
     /// Displacements at which Maxwell-slip elements may begin to slip, mm, ascending.
     pub knots_mm: Vec<f64>,
     /// Dead time from voltage to force if it is known from elsewhere, s, half a period of the voltage's hold included. A record
-    /// of gentle motions hardly tells it from inertia: what they tell well is `M' + sigma Td`.
+    /// of gentle motions hardly distinguishes it from inertia: it determines well only `M' + sigma Td`.
     pub dead_time_s: Option<f64>,
 }
 
@@ -62,21 +62,22 @@ pub struct Signals {
     pub voltage_v: Vec<f64>,
 }
 
-/// Share of the largest velocity below which the axis does not count as moving.
-const MOVING: f64 = 0.01;
-/// Samples a second that are always enough, Hz.
-const ENOUGH_HZ: f64 = 1000.0;
+/// Least velocity of an axis that counts as moving, over the largest velocity.
+const MIN_MOVING_SHARE: f64 = 0.01;
+/// Sampling rate that always suffices, Hz.
+const SUFFICIENT_RATE_HZ: f64 = 1000.0;
 /// Order of the position's filter.
 const ORDER: usize = 4;
-/// Order of the decimation's filter, and its cut-off as a share of half the new rate.
+/// Order of the decimation's filter.
 const DECIMATION_ORDER: usize = 8;
+/// Cut-off of this filter as a share of half the new rate.
 const DECIMATION_SHARE: f64 = 0.9;
 
 impl Signals {
     /// Filters and differentiates. A record of more than some kilohertz is thinned to one: nothing above that is used.
     pub fn new(recording: &Recording, settings: &MotionFitSettings) -> Self {
         let recorded_s = recording.sample_time_s;
-        let thinning = ((ENOUGH_HZ * recorded_s).recip().floor() as usize).max(1);
+        let thinning = ((SUFFICIENT_RATE_HZ * recorded_s).recip().floor() as usize).max(1);
         let period_s = recorded_s * thinning as f64;
         let thinned =
             |signal: &[f64]| -> Vec<f64> { signal.iter().copied().step_by(thinning).collect() };
@@ -113,7 +114,7 @@ impl Signals {
     /// Speed from which on the axis counts as moving, mm/s.
     pub(super) fn moving_mm_s(&self) -> f64 {
         let speeds = self.velocity_mm_s.iter().map(|v| v.abs());
-        MOVING * speeds.fold(0.0, f64::max)
+        MIN_MOVING_SHARE * speeds.fold(0.0, f64::max)
     }
 
     /// Duration and travel of the record.

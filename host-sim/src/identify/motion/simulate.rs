@@ -162,8 +162,8 @@ pub fn replay_closed_loop(
     replayed(model, recording, signals, |sample, position| {
         let velocity = (position - before[0]) / (2.0 * recording.sample_time_s);
         before = [before[1], position];
-        let wanted = cascade.position_gain_per_s * (recording.reference_mm[sample] - position);
-        let voltage = cascade.velocity_gain_v_s_per_mm * (wanted - velocity);
+        let commanded = cascade.position_gain_per_s * (recording.reference_mm[sample] - position);
+        let voltage = cascade.velocity_gain_v_s_per_mm * (commanded - velocity);
         voltage.clamp(-cascade.limit_v, cascade.limit_v)
     })
 }

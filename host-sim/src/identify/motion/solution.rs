@@ -56,7 +56,7 @@ impl Solution {
             let dead_time_s = match known_s {
                 Some(known_s) => known_s,
                 None if structure.dead_time => values[0],
-                // A held voltage is late by half its hold, whatever the axis is.
+                // A held voltage is late by half its hold, on every axis.
                 None if structure.sliding => regression.hold_s(),
                 None => 0.0,
             };
@@ -113,10 +113,10 @@ impl Solution {
         residual: &DVector<f64>,
         estimates: Vec<Estimate>,
     ) -> Result<MotionModel, MotionFitError> {
-        let sum = |wanted: &dyn Fn(Term) -> bool| -> f64 {
+        let sum = |counts: &dyn Fn(Term) -> bool| -> f64 {
             let terms = regression.terms.iter().zip(self.coefficients.iter());
             terms
-                .filter(|(term, _)| wanted(**term))
+                .filter(|(term, _)| counts(**term))
                 .map(|(_, value)| value)
                 .sum()
         };

@@ -7,10 +7,11 @@ use super::regressors::{Regression, Term, Way};
 use super::signals::MotionFitSettings;
 use super::solution::Solution;
 
-/// Names of what is not linear.
+/// Name of the dead time.
 const DEAD_TIME: &str = "Td";
+/// Name of the Stribeck velocity.
 const STRIBECK_VELOCITY: &str = "Vs";
-/// Blocks that standard errors are taken over.
+/// Number of blocks from which standard errors are computed.
 const BLOCKS: usize = 40;
 /// Share by which a parameter is shifted for a difference quotient.
 const SHIFT: f64 = 1e-3;

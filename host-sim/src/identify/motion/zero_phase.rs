@@ -41,7 +41,7 @@ fn sections(sample_time_s: f64, cutoff_hz: f64, order: usize) -> Option<Vec<Coef
         .collect()
 }
 
-/// One pass, started as if the first sample had been there for ever.
+/// One pass, started as if the first sample had been there since minus infinity.
 fn pass(sections: &[Coefficients<f64>], signal: &mut [f64]) {
     let start = signal.first().copied().unwrap_or(0.0);
     // Section by section a sample would wait for the one before it: so the processor works on several sections at a time.

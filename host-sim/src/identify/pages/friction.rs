@@ -108,7 +108,7 @@ pub fn friction_section(map: &FrictionMap, found: &FrictionFit) -> Section {
         id: "friction".to_owned(),
         heading: "Friction at constant velocity".to_owned(),
         prose: vec![
-            "At constant velocity the voltage is the friction. The slope at high velocity is σ + B / A, which motion cannot tell \
+            "At constant velocity the voltage is the friction. The slope at high velocity is σ + B / A, which motion cannot separate \
              apart, and each direction's level contains the amplifier's offset."
                 .to_owned(),
         ],

@@ -147,7 +147,7 @@ pub fn revise_sections(
         prose: vec![
             "An axis' frequency response already contains its friction. With friction explicit, A, B and C are revised until \
              both together show what was measured; every candidate is excited as the axis was. The friction carries the whole \
-             viscous damping, which motion cannot tell from B, so B falls towards zero wherever the friction has a viscous term."
+             viscous damping, which motion cannot separate from B, so B falls towards zero wherever the friction has a viscous term."
                 .to_owned(),
             "For controllers the original model counts: it is what the loop sees at working amplitude.".to_owned(),
         ],

@@ -79,15 +79,15 @@ pub enum FrictionFitError {
     Fit(#[from] FitError),
 }
 
-/// Residuals of a level that rises with the speed, over those of one that does not, from which on it is taken: a rise is easily
+/// Largest residuals of a level that rises with the speed, over those of a constant one, with which it is chosen: a rise is easily
 /// mistaken for viscous friction.
-const RISING: f64 = 0.7;
+const MAX_RESIDUAL_RATIO: f64 = 0.7;
 /// Level at rest, over that at high speed, below which a rise is no friction's.
 const LEAST_LEVEL: f64 = 0.2;
-/// Level at rest over the largest voltage of any run up to which it was measured: beyond, only the curve says so.
-const MEASURED: f64 = 1.25;
+/// Largest level at rest over the largest voltage of any run that counts as measured: beyond, only the curve says so.
+const MAX_EXTRAPOLATION: f64 = 1.25;
 /// An error of each mean that does not scatter within its run, over the voltage.
-const SYSTEMATIC: f64 = 2e-4;
+const SYSTEMATIC_ERROR: f64 = 2e-4;
 
 /// Fits both directions.
 ///
@@ -181,7 +181,7 @@ fn fit_direction(
         let model = model(values, fixed);
         runs.iter()
             .map(|run| {
-                let deviation = run.deviation_v.hypot(SYSTEMATIC * run.voltage_v);
+                let deviation = run.deviation_v.hypot(SYSTEMATIC_ERROR * run.voltage_v);
                 (model.friction_v(run.velocity_mm_s) - run.voltage_v) / deviation
             })
             .collect()
@@ -192,8 +192,8 @@ fn fit_direction(
         found => found,
     };
     let mut fit = search(&parameters)?;
-    if fit.values[0] + fit.values[1] > MEASURED * most {
-        parameters[1].bounds.1 = (MEASURED - 1.0) * most;
+    if fit.values[0] + fit.values[1] > MAX_EXTRAPOLATION * most {
+        parameters[1].bounds.1 = (MAX_EXTRAPOLATION - 1.0) * most;
         parameters[1].start = parameters[1].start.min(0.5 * parameters[1].bounds.1);
         parameters[2].bounds.0 = low;
         fit = search(&parameters)?;
@@ -207,7 +207,7 @@ fn fit_direction(
     rising[0].start = fastest.voltage_v;
     if rising[1].start < 0.0
         && let Ok(rising) = search(&rising)
-        && rising.residual_rms < RISING * fit.residual_rms
+        && rising.residual_rms < MAX_RESIDUAL_RATIO * fit.residual_rms
         && rising.values[0] + rising.values[1] > LEAST_LEVEL * rising.values[0]
     {
         fit = rising;

@@ -13,7 +13,7 @@ pub struct FrictionRun {
     pub voltage_v: f64,
     /// Standard deviation of that mean, from the scatter within the run, V.
     pub deviation_v: f64,
-    /// The axis stuck and slipped instead of moving evenly, or was shaken loose: the mean is no friction at this velocity.
+    /// The axis stuck and slipped instead of moving evenly, or broke away under vibration: the mean is no friction at this velocity.
     pub stick_slip: bool,
 }
 
@@ -24,10 +24,10 @@ pub struct FrictionMap {
     pub runs: Vec<FrictionRun>,
 }
 
-/// Exponent of the speed that friction falls with, from one run to the next slower one, of an axis that is shaken loose.
-const PROPORTIONAL: f64 = 0.5;
-/// Share of the speed from which on it is not, below which runs are marked.
-const BELOW: f64 = 0.95;
+/// Least exponent of the fall of friction with speed, from one run to the next slower one, of an axis that breaks away under vibration.
+const MIN_BREAKAWAY_EXPONENT: f64 = 0.5;
+/// Runs below this share of the first speed without such a fall are marked.
+const MARKED_SPEED_SHARE: f64 = 0.95;
 
 /// Fewest even runs of a direction by which its friction is known.
 pub(super) const LEAST_RUNS: usize = 6;
@@ -85,7 +85,7 @@ impl FrictionMap {
     }
 
     /// Marks the slowest runs in which friction falls nearly in proportion to speed: noise or a vibration that is quicker than the
-    /// axis shakes it loose there. Nothing of an axis that has hardly any friction but that.
+    /// axis makes it break away there. Nothing of an axis that has hardly any friction but that.
     pub(super) fn mark_shaken(&mut self) {
         let shaken = [1.0, -1.0].map(|sign| {
             let runs = self.direction(sign);
@@ -93,7 +93,8 @@ impl FrictionMap {
                 let [slow, fast] = [pair[0], pair[1]];
                 let volts = fast.voltage_v / slow.voltage_v;
                 slow.voltage_v <= 0.0
-                    || volts.ln() > PROPORTIONAL * (fast.velocity_mm_s / slow.velocity_mm_s).ln()
+                    || volts.ln()
+                        > MIN_BREAKAWAY_EXPONENT * (fast.velocity_mm_s / slow.velocity_mm_s).ln()
             };
             let count = runs.windows(2).take_while(falls).count();
             if runs.len() < count + LEAST_RUNS {
@@ -106,7 +107,7 @@ impl FrictionMap {
         };
         // The two directions' speeds differ by what the axis did not follow.
         for run in &mut self.runs {
-            run.stick_slip |= run.velocity_mm_s.abs() < BELOW * below_mm_s;
+            run.stick_slip |= run.velocity_mm_s.abs() < MARKED_SPEED_SHARE * below_mm_s;
         }
     }
 
@@ -152,8 +153,8 @@ mod tests {
     }
 
     #[test]
-    fn the_slowest_runs_are_marked_in_which_friction_falls_with_speed_as_where_it_is_shaken_loose()
-    {
+    fn the_slowest_runs_are_marked_in_which_friction_falls_with_speed_as_where_a_vibration_breaks_it_away()
+     {
         let speeds = (0..12).map(|index| 0.1 * 1.35_f64.powi(index));
         let marked = |friction_v: fn(f64) -> f64| {
             let mut map = FrictionMap {

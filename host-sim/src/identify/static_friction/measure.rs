@@ -58,11 +58,13 @@ pub enum StaticFrictionError {
     Experiment(#[from] ExperimentError),
 }
 
-/// Acceleration and jerk of the moves.
+/// Acceleration of the moves, mm/s^2.
 const ACCELERATION_MM_S2: f64 = 500.0;
+/// Jerk of the moves, mm/s^3.
 const JERK_MM_S3: f64 = 2e4;
-/// Share of a short travel that is the stretch, and the settling time there, s.
+/// Length of the stretch over a short travel.
 const STRETCH_SHARE: f64 = 0.4;
+/// Settling time on a short travel, s.
 const SHORT_SETTLING_S: f64 = 0.6;
 /// Travel either way below which both sides are used, mm.
 const SHORT_MM: f64 = 60.0;
@@ -74,9 +76,10 @@ const SAMPLES: f64 = 20_000.0;
 const PARTS: usize = 20;
 /// Counts of the encoder over which the velocity is looked at for stick-slip.
 const STICK_SLIP_COUNTS: f64 = 4.0;
-/// Share of its velocity below which an axis sticks, and beyond which it slips.
-const STICKING: f64 = 0.3;
-const SLIPPING: f64 = 2.0;
+/// Velocity over the reference's below which an axis sticks.
+const MAX_STICK_RATIO: f64 = 0.3;
+/// Velocity over the reference's above which it slips.
+const MIN_SLIP_RATIO: f64 = 2.0;
 
 impl StaticFrictionSettings {
     /// A shorter stretch, less settling and slower runs where travel or limits do not hold the fastest.
@@ -180,7 +183,7 @@ impl StaticFrictionSettings {
     }
 }
 
-/// Measures the map on the test_axis's axis, under the settings that are in force.
+/// Measures the map on the axis under test, under the settings that are in force.
 ///
 /// # Errors
 /// Settings that cannot be, too little travel, or a run that is stopped.
@@ -317,7 +320,7 @@ fn sticks_and_slips(
         (f64::INFINITY, f64::NEG_INFINITY),
         |(least, most), share| (share.min(least), share.max(most)),
     );
-    least < STICKING && most > SLIPPING
+    least < MAX_STICK_RATIO && most > MIN_SLIP_RATIO
 }
 
 /// A scatter below which a mean is not believed to be, V.

@@ -1,7 +1,7 @@
 //! The static friction model from runs at constant velocity (thesis, Figs 3.8-3.10; Table 3.2).
 //!
-//! At constant velocity the voltage is the friction: `s(v) sgn(v) + (sigma + B / A) v - offset`. Two things cannot be told
-//! apart by it, and each has its convention here:
+//! At constant velocity the voltage is the friction: `s(v) sgn(v) + (sigma + B / A) v - offset`. Two things cannot be separated
+//! by it, and each has its convention here:
 //!
 //! - *sigma and B / A*: the slope at high velocity is their sum. The settings' viscous friction is that sum; the linear
 //!   model's B, which is the same damping seen by a controller, is not fed forward.

@@ -45,8 +45,8 @@ const SMOOTHING_SHARE: f64 = 1e-3;
 const STEP_S: f64 = 1e-3;
 /// Points of the averaged curve.
 const POINTS: usize = 120;
-/// Share of the whole travel by which the axis must come back to have turned round.
-const TURNED: f64 = 0.2;
+/// Distance over the whole travel by which the axis must come back to have turned round.
+const MIN_RETURN_SHARE: f64 = 0.2;
 
 impl Smooth {
     pub(super) fn of(recording: &Recording) -> Self {
@@ -67,7 +67,7 @@ impl Smooth {
     /// Indices at which the axis turns round.
     pub(super) fn reversals(&self) -> Vec<usize> {
         let (low, high) = range(&self.position_mm);
-        let threshold = TURNED * (high - low);
+        let threshold = MIN_RETURN_SHARE * (high - low);
         let mut turns = Vec::new();
         let (mut least, mut most) = (0, 0);
         let mut rising = None;

@@ -33,7 +33,7 @@ pub struct GmsFit {
 /// C as long as nothing determines it, V/s.
 pub const ASSUMED_ATTRACTION_V_S: f64 = 5.0;
 /// Share of the plateau up to which the curve is fitted: beyond it an axis may stick and slip.
-const FITTED: f64 = 0.97;
+const FITTED_SHARE: f64 = 0.97;
 /// Every so many samples of the hysteresis count in the refinement: neighbours are correlated by the smoothing.
 const THINNING: usize = 20;
 /// Step of the difference quotients: pieces of straight lines have corners.
@@ -120,7 +120,7 @@ fn fit_curve(
     let top_v = curve.top_v();
     let rising = curve
         .points
-        .partition_point(|point| point.force_v < FITTED * top_v.min(level_v));
+        .partition_point(|point| point.force_v < FITTED_SHARE * top_v.min(level_v));
     let fitted = &curve.points[..rising.max(2 * count).min(curve.points.len())];
     let reach_mm = fitted.last().map_or(1e-3, |point| point.displacement_mm);
     let start = Shape {

@@ -29,14 +29,14 @@ impl Default for VirginCurveSettings {
 }
 
 /// Amplitude over the tracking error at which the axis breaks away.
-const AMPLITUDE: f64 = 2.0;
+const AMPLITUDE_RATIO: f64 = 2.0;
 
 impl VirginCurveSettings {
     /// The usual sine with an amplitude that outruns a controller of proportional gain `kp_v_per_mm` on an axis that breaks
     /// away at `breakaway_v`.
     pub fn outrunning(kp_v_per_mm: f64, breakaway_v: f64) -> Self {
         Self {
-            amplitude_mm: AMPLITUDE * breakaway_v / kp_v_per_mm,
+            amplitude_mm: AMPLITUDE_RATIO * breakaway_v / kp_v_per_mm,
             ..Self::default()
         }
     }
@@ -52,7 +52,7 @@ impl VirginCurveSettings {
 /// Rate of the recording, Hz.
 const RATE_HZ: f64 = 1000.0;
 
-/// Measures the hysteresis on the test_axis's axis, under the settings that are in force.
+/// Measures the hysteresis on the axis under test, under the settings that are in force.
 ///
 /// # Errors
 /// A run that is stopped.

@@ -8,8 +8,8 @@ use super::error::VirginCurveError;
 use crate::identify::fit::{Loss, Parameter, fit};
 use crate::record::Recording;
 
-/// Slope at the end of the curve over its slope at the beginning below which it is flat.
-const FLAT: f64 = 0.04;
+/// Largest slope at the end of a curve that counts as flat, over the slope at its beginning.
+const MAX_FLAT_SLOPE: f64 = 0.04;
 
 /// Checks that the curve has become flat; an exponential through it estimates how far it would have to go.
 pub(super) fn check_plateau(
@@ -40,7 +40,7 @@ pub(super) fn check_plateau(
         .find(|point| point.displacement_mm >= 0.7 * end.displacement_mm)
         .unwrap_or(end);
     let last = slope(three_quarters, end);
-    if last <= FLAT * initial {
+    if last <= MAX_FLAT_SLOPE * initial {
         return Ok(());
     }
     let rate = Parameter {

@@ -43,7 +43,7 @@ struct Step {
 }
 
 /// Attraction rates whose surfaces are kept: that of a difference quotient's middle, and those of its ends.
-const LATEST: usize = 3;
+const KEPT_SURFACES: usize = 3;
 
 impl Trajectory {
     pub(super) fn new(smooth: &Smooth, sliding: &PerDirection<StaticFriction>) -> Self {
@@ -64,7 +64,7 @@ impl Trajectory {
             steps: smooth.position_mm.iter().map(step).collect(),
             curves: sliding.map(|model| model.curve),
             sample_time_s: smooth.sample_time_s,
-            latest: Latest::new(LATEST),
+            latest: Latest::new(KEPT_SURFACES),
         }
     }
 

@@ -5,9 +5,11 @@ use quadrant_law::friction::gms::{GmsElement, GmsParameters, MAX_ELEMENTS};
 
 use crate::identify::fit::Parameter;
 
-/// Bounds of each knot over the one before, and the least share of an element in what those before have left.
+/// Least ratio of a knot to the one before.
 const SMALLEST_RATIO: f64 = 1.2;
+/// Largest ratio of a knot to the one before.
 const LARGEST_RATIO: f64 = 3.5;
+/// Least share of an element in what those before have left.
 const LEAST_SHARE: f64 = 0.05;
 
 /// Knots and shares, in variables that any values are allowed for: each knot over the one before, each share of what

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 /// Looks before the first pause: an answer takes some 10 us, a look less than 1.
 const LOOKS: u32 = 100;
-/// Pauses that only yield to whoever wants the processor, before those that sleep.
+/// Pauses that only yield the processor, before those that sleep.
 const YIELDS: u32 = 200;
 /// A pause that sleeps.
 const SLEEP: Duration = Duration::from_micros(50);

@@ -86,7 +86,7 @@ impl Lockstep {
         self.emulator.new_lines()
     }
 
-    /// Hands over the next tick's inputs.
+    /// Passes the next tick's inputs.
     ///
     /// # Errors
     /// As [`ask_all`](Self::ask_all).
@@ -94,7 +94,7 @@ impl Lockstep {
         self.ask_all(std::slice::from_ref(input))
     }
 
-    /// Hands over the inputs of the next ticks, which the firmware runs one after the other.
+    /// Passes the inputs of the next ticks, which the firmware runs one after the other.
     ///
     /// # Errors
     /// The memory fails, or more than [`room`](Self::room) are asked.

@@ -40,7 +40,7 @@ pub struct Emulator {
 /// QEMU's command line for a program in a memory; the firmware's log comes at standard output.
 pub fn command_line(program: &Program, memory: &Memory, clock: Clock) -> Command {
     let mut qemu = Command::new(QEMU);
-    // The libraries of whoever started us are not QEMU's.
+    // The libraries of the parent process are not QEMU's.
     qemu.env_remove("LD_LIBRARY_PATH").stdin(Stdio::null());
     // Ctrl-C in the terminal is for the host, which stops the axes and ends QEMU itself.
     #[cfg(unix)]

@@ -27,9 +27,11 @@ pub(super) const TRAVEL_MM: f64 = 200.0;
 const ENABLE_TICKS: usize = 1000;
 /// Control periods between two reports of progress.
 const PROGRESS_TICKS: usize = 20_000;
-/// Control periods in which an axis without its outputs comes to rest, those for which it must stand, and the velocity that counts as rest, mm/s.
+/// Control periods in which an axis without its outputs comes to rest.
 const COASTING_TICKS: usize = 20_000;
+/// Control periods for which it must stand.
 const REST_TICKS: usize = 300;
+/// Largest velocity that counts as rest, mm/s.
 const AT_REST_MM_S: f64 = 0.01;
 /// Names of the axes.
 const NAMES: [&str; 3] = ["x", "y", "z"];
@@ -174,7 +176,7 @@ impl SimulatedTestAxis {
             let position_mm = moved_mm + self.travel.start_mm();
             let Some(step) = law.step(raw, experiment)? else {
                 if waited == ENABLE_TICKS && !rested {
-                    // As a person would, who is told that the axis still moves.
+                    // As a person would, who sees that the axis still moves.
                     rested = true;
                     waited = 0;
                     self.coast();

@@ -72,7 +72,7 @@ fn reach_um<'a>(entries: impl Iterator<Item = &'a Entry>) -> f64 {
     ROOM * UM_PER_MM * largest
 }
 
-/// An error figure under the thesis' number; `part` tells apart several of one number.
+/// An error figure under the thesis' number; `part` distinguishes several of one number.
 fn figure(
     (number, part): (usize, &str),
     caption: String,

@@ -18,6 +18,7 @@ use crate::machine::SimulatedPeer;
 
 /// Control ticks in an exchange, of 0.1 ms.
 const TICKS: u32 = 10;
+/// Room for set points.
 const ROOM: u16 = 16;
 
 /// Observations and disturbances of a test, unseen by the client.
