@@ -7,6 +7,31 @@ use quadrant_law::friction::{Direction, FrictionSettings};
 use quadrant_law::reference::{HarmonicSettings, Motion, MotionScale, MotionSettings};
 use quadrant_law::{command::Command, control::pid::PidGains, encoder::EncoderReading};
 
+fn main() -> Result<(), AxisError> {
+    let friction = friction();
+    let sine = HarmonicSettings::with_velocity(10.0, 5.0, 1.0, 0.5);
+    let motion = Motion::build(&MotionSettings::Harmonic(sine), SCALE);
+    for kind in [FeedforwardKind::None, FeedforwardKind::Combined] {
+        let axis = Axis::<f32, 8>::build(SCALE, |axis| {
+            axis.amplifier(10.0, 10.0, 0.0, false)
+                .pid(&GAINS, 2.0)
+                .feedforward(kind, &FeedforwardGains::whole(INERTIA), &friction, 0)
+        })?;
+        let (mut state, mut mass) = (AxisState::default(), Mass::new(&friction));
+        let mut largest_mm = 0.0_f32;
+        axis.handle_command(&mut state, Command::Run);
+        for tick in 0..150_000 {
+            let reading = EncoderReading::of(mass.count());
+            let code = axis.tick(&mut state, &motion, &reading, tick).unwrap();
+            mass.step(code.to_volts(10.0));
+            largest_mm = largest_mm.max(state.telemetry().error_mm().abs());
+        }
+        println!("feedforward {}: {:.2} um", kind.name(), 1e3 * largest_mm);
+    }
+    Ok(())
+}
+
+/// Counts of 0.5 um, 10 000 ticks a second.
 const SCALE: MotionScale = MotionScale::new(0.5e-3, 1e4);
 const GAINS: PidGains = PidGains {
     kp_v_per_mm: 1.118,
@@ -14,34 +39,8 @@ const GAINS: PidGains = PidGains {
     kd_v_s_per_mm: 5.537e-3,
     derivative_filter_s: 52e-6,
 };
-
-fn largest_error_um(kind: FeedforwardKind) -> Result<f32, AxisError> {
-    let friction = friction();
-    let axis = Axis::<f32, 8>::build(SCALE, |axis| {
-        let gains = FeedforwardGains::whole(1.0 / 69_390.0);
-        axis.amplifier(10.0, 10.0, 0.0, false)
-            .pid(&GAINS, 2.0)
-            .feedforward(kind, &gains, &friction, 0)
-    })?;
-    let sine = HarmonicSettings::with_velocity(10.0, 5.0, 1.0, 0.5);
-    let motion = Motion::build(&MotionSettings::Harmonic(sine), SCALE);
-    let (mut state, mut mass) = (AxisState::default(), Mass::new(&friction));
-    let mut largest = 0.0_f32;
-    axis.handle_command(&mut state, Command::Run);
-    for tick in 0..150_000 {
-        let reading = EncoderReading::of(mass.count());
-        let code = axis.tick(&mut state, &motion, &reading, tick).unwrap();
-        mass.step(code.to_volts(10.0));
-        largest = largest.max(state.telemetry().error_mm().abs());
-    }
-    Ok(1000.0 * largest)
-}
-
-fn main() -> Result<(), AxisError> {
-    let [without, with] = [FeedforwardKind::None, FeedforwardKind::Combined].map(largest_error_um);
-    println!("PID: {:.2} um, with feedforward: {:.2} um", without?, with?);
-    Ok(())
-}
+/// V s^2/mm.
+const INERTIA: f64 = 1.0 / 69_390.0;
 
 /// The friction of the axis, as it would be identified.
 fn friction() -> FrictionSettings {
