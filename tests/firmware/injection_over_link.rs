@@ -4,12 +4,13 @@ use quadrant::link::message::{
     AxisName as WireAxis, Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, Voltages,
 };
 use quadrant_law::axes::AxisName;
+use quadrant_law::units::DacCode;
 
 use crate::preemption::settings;
 use quadrant_fault_bench::tasks::Tasks;
 
 /// The converter's words per volt.
-const PER_VOLT: f32 = 3276.7;
+const PER_VOLT: f32 = DacCode::FULL_SCALE as f32 / 10.0;
 
 fn inject(tasks: &mut Tasks, request: InjectRequest) -> InjectStatus {
     match tasks.ask(Body::Inject(request)) {

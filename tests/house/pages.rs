@@ -100,3 +100,12 @@ fn the_book_contains_every_page_of_the_documentation() {
         .collect();
     assert_none("pages that docs/SUMMARY.md leaves out", &missing);
 }
+
+#[test]
+fn the_page_of_the_law_shows_the_code_that_is_built() {
+    let read = |path: &str| fs::read_to_string(root().join(path)).expect("a file");
+    let page = read("docs/law-in-your-firmware.md");
+    let (_, from) = page.split_once("```rust\n").expect("code");
+    let (shown, _) = from.split_once("```").expect("its end");
+    assert_eq!(shown, read("examples/firmware/src/lib.rs"));
+}

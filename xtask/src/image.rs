@@ -16,6 +16,9 @@ pub const TRIPLES: [&str; 2] = ["thumbv7em-none-eabihf", "thumbv7m-none-eabi"];
 /// Other targets for which the library is built: a Cortex-M0 without atomics, and a RISC-V.
 pub const LIBRARY_TRIPLES: [&str; 2] = ["thumbv6m-none-eabi", "riscv32imc-unknown-none-elf"];
 
+/// Further targets for which the law is built as in a firmware of another project: a Cortex-M33, and a RISC-V with atomics.
+pub const LAW_TRIPLES: [&str; 2] = ["thumbv8m.main-none-eabihf", "riscv32imac-unknown-none-elf"];
+
 /// The machines the firmware is built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Board {

@@ -6,7 +6,7 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 
 use xtask::command;
-use xtask::image::{LIBRARY_TRIPLES, TRIPLES};
+use xtask::image::{LAW_TRIPLES, LIBRARY_TRIPLES, TRIPLES};
 use xtask::toolchain::{Choice, Toolchain, WEB_TRIPLE};
 
 /// Something that must be there, how to see it, and the Debian package it comes in.
@@ -119,6 +119,7 @@ fn add_targets() -> Result<()> {
     let missing: Vec<&str> = TRIPLES
         .into_iter()
         .chain(LIBRARY_TRIPLES)
+        .chain(LAW_TRIPLES)
         .chain([WEB_TRIPLE])
         .filter(|triple| !installed.lines().any(|line| line == *triple))
         .collect();

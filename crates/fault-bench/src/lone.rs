@@ -97,7 +97,7 @@ impl<S: Scalar> Lone<S> {
                 .axis
                 .tick(&mut self.state, &self.motion, &reading, self.ticks);
             match code {
-                Ok(code) => self.output_v = f64::from(code.0) / 32767.0 * self.full_scale_v,
+                Ok(code) => self.output_v = code.to_volts(self.full_scale_v),
                 Err(fault) => (self.fault, self.output_v) = (Some(fault), 0.0),
             }
             if self.ticks == 1 {

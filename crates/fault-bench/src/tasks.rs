@@ -101,7 +101,7 @@ impl Upper {
         let mut counts = references.map(|position| position >> POSITION_FRACTION_BITS);
         counts[0] += self.pushed;
         if let Some(x) = &mut self.x {
-            let volts = f64::from(self.outputs.codes[0].0) / 32767.0 * 10.0;
+            let volts = self.outputs.codes[0].to_volts(10.0);
             x.plant.step(if self.outputs.enabled { volts } else { 0.0 });
             x.dead = x.dead.map(|age| age + 1);
             counts[0] = x.encoder.read(x.plant.position_mm, x.dead);

@@ -123,6 +123,18 @@ pub struct FeedforwardGains {
     pub inertia_v_s2_per_mm: f64,
 }
 
+impl FeedforwardGains {
+    /// The whole of each identified effect, and this inertia.
+    pub const fn whole(inertia_v_s2_per_mm: f64) -> Self {
+        Self {
+            level: 1.0,
+            viscous: 1.0,
+            gms: 1.0,
+            inertia_v_s2_per_mm,
+        }
+    }
+}
+
 /// The reference's motion in one tick, as far ahead as the feedforward looks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReferenceStep<S> {

@@ -31,7 +31,39 @@
 //! in the tick that finds it, or brakes it under control where that is safer. [`supervisor`] stands between a person's
 //! requests and the tick.
 //!
-//! # An axis in ten lines
+//! # One axis
+//!
+//! PID, and a feedforward of friction and inertia that looks 12 ticks ahead. `docs/law-in-your-firmware.md` of the
+//! repository is the same in a firmware.
+//!
+//! ```
+//! use quadrant_law::axis::{Axis, AxisState};
+//! use quadrant_law::control::pid::PidGains;
+//! use quadrant_law::encoder::EncoderReading;
+//! use quadrant_law::feedforward::{FeedforwardGains, FeedforwardKind};
+//! use quadrant_law::friction::{FrictionSettings, gms::GmsParameters, stribeck::{StaticFriction, StribeckCurve}};
+//! use quadrant_law::reference::{Motion, MotionScale};
+//!
+//! let gains = PidGains { kp_v_per_mm: 1.1, ki_v_per_mm_s: 0.7, kd_v_s_per_mm: 5.5e-3, derivative_filter_s: 52e-6 };
+//! let curve = StribeckCurve { coulomb_v: 0.12, breakaway_v: 0.15, stribeck_velocity_mm_s: 1.0, exponent: 1.0 };
+//! let sliding = StaticFriction { curve, viscous_v_s_per_mm: 2e-3 };
+//! let gms = GmsParameters::new([(21.4, 0.30), (7.5, 0.30), (2.66, 0.25), (0.75, 0.15)], 5.0);
+//! let friction = FrictionSettings::new(sliding, gms);
+//! // Counts of 0.5 um, 10 000 ticks a second.
+//! let axis = Axis::<f32, 8>::build(MotionScale::new(0.5e-3, 1e4), |axis| {
+//!     axis.amplifier(9.0, 10.0, 0.0, false)
+//!         .pid(&gains, 2.0)
+//!         .feedforward(FeedforwardKind::Combined, &FeedforwardGains::whole(14.4e-6), &friction, 12)
+//! })?;
+//! let mut state = AxisState::default();
+//! axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(0), 0).unwrap();
+//! // Pushed one count away, the axis pushes back.
+//! let code = axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(1), 1).unwrap();
+//! assert!(code.to_volts(10.0) < 0.0);
+//! # Ok::<(), quadrant_law::axis::AxisError>(())
+//! ```
+//!
+//! # A stage of three
 //!
 //! ```
 //! use quadrant_law::axes::PerAxis;
@@ -50,8 +82,6 @@
 //! assert!(stage.tick(&plan, &mut state, &moved).codes[0].0 < 0);
 //! # Ok::<(), quadrant_settings::SettingsError>(())
 //! ```
-//!
-//! One axis without settings is in [`axis`].
 //!
 //! # Three kinds of type
 //!

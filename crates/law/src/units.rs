@@ -125,4 +125,23 @@ impl DacCode {
             Self(code as i16)
         }
     }
+
+    /// The nearest code of a voltage on a converter of +-`full_scale_v`, saturating at both ends; a voltage that is no
+    /// number is zero. Settings time and host only.
+    ///
+    /// ```
+    /// use quadrant_law::units::DacCode;
+    ///
+    /// assert_eq!(DacCode::from_volts(2.5, 10.0), DacCode(8192));
+    /// assert_eq!(DacCode::from_volts(-12.0, 10.0), DacCode(-32768));
+    /// assert!((DacCode(8192).to_volts(10.0) - 2.5).abs() < 0.5 * 10.0 / DacCode::FULL_SCALE);
+    /// ```
+    pub fn from_volts(volts: f64, full_scale_v: f64) -> Self {
+        Self::saturating(rounding::round(volts / full_scale_v * Self::FULL_SCALE) as i32)
+    }
+
+    /// The code in volts on a converter of +-`full_scale_v`. Settings time and host only.
+    pub const fn to_volts(self, full_scale_v: f64) -> f64 {
+        self.0 as f64 / Self::FULL_SCALE * full_scale_v
+    }
 }

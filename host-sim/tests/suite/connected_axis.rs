@@ -11,6 +11,7 @@ use quadrant::link::message::{
 use quadrant_law::axes::AxisName;
 use quadrant_law::reference::{MotionSettings, PointToPointSettings};
 use quadrant_law::safety::FaultCode;
+use quadrant_law::units::DacCode;
 use quadrant_sim::client::test_axis::ConnectedAxis;
 use quadrant_sim::client::{Client, ClientError, settings};
 use quadrant_sim::commission::bootstrap::{measuring_settings, zero_gain_settings};
@@ -282,7 +283,7 @@ fn in_open_loop_the_recording_is_what_was_put_out() {
     assert_eq!(recording.len(), 10_000);
     assert!((recording.sample_time_s - 2e-4).abs() < 1e-12);
     // The recording may begin a tick after the injection.
-    let step_v = 10.0 / 32767.0;
+    let step_v = DacCode(1).to_volts(10.0);
     let means = |offset: usize| -> f64 {
         let pairs = experiment.injection_v[offset..].chunks_exact(2);
         pairs

@@ -6,7 +6,7 @@ use quadrant_sim::plant::{SimulatedAxis, SimulatedStage, StageParameters};
 const RATE_HZ: f64 = 10e3;
 
 fn code(volts: f64) -> DacCode {
-    DacCode((volts / 10.0 * DacCode::FULL_SCALE).round() as i16)
+    DacCode::from_volts(volts, 10.0)
 }
 
 fn x_axis() -> SimulatedAxis {
@@ -107,7 +107,7 @@ fn a_held_voltage_moves_the_axis_as_it_would_in_continuous_time() {
     let damping =
         truth.damping_per_s + truth.gain_mm_per_v_s2 * truth.friction.positive.viscous_v_s_per_mm;
     let mut axis = SimulatedAxis::new(truth.clone(), RATE_HZ, 1);
-    let volts = 3276.0 / 32767.0 * 10.0;
+    let volts = DacCode(3276).to_volts(10.0);
     for tick in 1..=500 {
         axis.step(DacCode(3276), true);
         let time = (f64::from(tick) / RATE_HZ - truth.delay_s).max(0.0);

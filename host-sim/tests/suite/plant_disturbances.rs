@@ -11,7 +11,7 @@ const RATE_HZ: f64 = 10e3;
 const COMPONENTS: [Component; 2] = [Component::Feed, Component::Normal];
 
 fn code(volts: f64) -> DacCode {
-    DacCode((volts / 10.0 * DacCode::FULL_SCALE).round() as i16)
+    DacCode::from_volts(volts, 10.0)
 }
 
 fn ideal() -> AxisParameters {

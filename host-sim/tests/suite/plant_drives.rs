@@ -8,7 +8,7 @@ use quadrant_sim::plant::{
 const RATE_HZ: f64 = 10e3;
 
 fn code(volts: f64) -> DacCode {
-    DacCode((volts / 10.0 * DacCode::FULL_SCALE).round() as i16)
+    DacCode::from_volts(volts, 10.0)
 }
 
 fn ideal() -> AxisParameters {

@@ -1,6 +1,7 @@
 //! Experiments on the simulated stage's axes.
 
 use quadrant_law::reference::{MotionSettings, PointToPointSettings};
+use quadrant_law::units::DacCode;
 use quadrant_settings::presets::x_axis;
 use quadrant_sim::machine::{Drive, Experiment, ExperimentError, SimulatedTestAxis, TestAxis};
 use quadrant_sim::plant::StageParameters;
@@ -71,7 +72,7 @@ fn an_open_loop_gets_the_injection_and_nothing_else() {
         .iter()
         .zip(&recording.voltage_v)
         .fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
-    assert!(worst <= 0.5 * 10.0 / 32767.0 + 1e-12);
+    assert!(worst <= 0.5 * DacCode(1).to_volts(10.0) + 1e-12);
     assert!(recording.position_mm.iter().any(|y| *y > 0.1));
 }
 

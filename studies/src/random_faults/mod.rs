@@ -12,6 +12,7 @@ use quadrant::link::message::{
 };
 use quadrant_law::command::Command;
 use quadrant_law::safety::{SafetyState, Switches};
+use quadrant_law::units::DacCode;
 use quadrant_settings::StageSettings;
 
 use quadrant_fault_bench::flash::{Damage, SECTOR};
@@ -394,7 +395,7 @@ fn run(campaign: &Campaign) -> Result<End, String> {
         if injects && !silent && at > 150 && at.is_multiple_of(20) {
             let values = Voltages::new((0..20).map(|place| {
                 let turn = core::f64::consts::TAU * 20.0 * 1e-4 * f64::from(words + place);
-                (0.8 * turn.sin() / 10.0 * 32767.0) as i16
+                (0.8 * turn.sin() / 10.0 * DacCode::FULL_SCALE) as i16
             }));
             let sequence = words;
             words += 20;

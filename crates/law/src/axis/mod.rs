@@ -1,29 +1,27 @@
 //! One axis, one tick: counts in, a converter's word out.
 //!
-//! An [`Axis`] is what the tick reads, made by an [`AxisBuilder`]; an [`AxisState`] is what it remembers. The stage
-//! ticks three of them together; [`Axis::tick`] ticks one alone.
+//! An [`Axis`] is what the tick reads, made by [`Axis::build`] or, in place, by an [`AxisBuilder`]; an [`AxisState`] is
+//! what it remembers. The stage ticks three of them together; [`Axis::tick`] ticks one alone.
 //!
 //! ```
-//! use quadrant_law::axis::{Axis, AxisBuilder, AxisState};
-//! use quadrant_law::control::feedback::Feedback;
-//! use quadrant_law::control::pid::{Pid, PidGains};
+//! use quadrant_law::axis::{Axis, AxisState};
+//! use quadrant_law::control::pid::PidGains;
 //! use quadrant_law::encoder::EncoderReading;
-//! use quadrant_law::reference::Motion;
+//! use quadrant_law::reference::{Motion, MotionScale};
 //!
 //! let gains = PidGains { kp_v_per_mm: 1.0, ki_v_per_mm_s: 0.5, kd_v_s_per_mm: 5e-3, derivative_filter_s: 50e-6 };
-//! let mut axis = Axis::<f32, 8>::blank();
-//! AxisBuilder::new(&mut axis, 0.5e-3, 1e-4)
-//!     .amplifier(10.0, 10.0, 0.0, false)
-//!     .feedback(Feedback::Pid(Pid::build(&gains, 2.0, 1e-4)))
-//!     .try_build()?;
+//! // Counts of 0.5 um, 10 000 ticks a second, outputs within +-9 V on a converter of +-10 V.
+//! let scale = MotionScale::new(0.5e-3, 1e4);
+//! let axis = Axis::<f32, 8>::build(scale, |axis| axis.amplifier(9.0, 10.0, 0.0, false).pid(&gains, 2.0))?;
 //! let mut state = AxisState::default();
 //! axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(0), 0).unwrap();
-//! // Pushed one count (0.5 um) away, the axis pushes back.
+//! // Pushed one count away, the axis pushes back.
 //! let code = axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(1), 1).unwrap();
-//! assert!(code.0 < 0);
+//! assert!(code.to_volts(10.0) < 0.0);
 //! # Ok::<(), quadrant_law::axis::AxisError>(())
 //! ```
 
+mod build;
 mod rest;
 pub mod telemetry;
 

@@ -60,6 +60,17 @@ pub struct GmsParameters {
 }
 
 impl GmsParameters {
+    /// Blocks of a stiffness in V/mm and a share of the load each, and the attraction in V/s.
+    pub fn new<const COUNT: usize>(blocks: [(f64, f64); COUNT], attraction_v_s: f64) -> Self {
+        Self {
+            elements: Vec::from_array(blocks.map(|(stiffness_v_per_mm, weight)| GmsElement {
+                stiffness_v_per_mm,
+                weight,
+            })),
+            attraction_v_s,
+        }
+    }
+
     /// The force in V at a displacement in mm from rest on a surface of constant level: the virgin curve
     /// `sum(min(k_i x, alpha_i s))`, odd in the displacement. Settings time and host only.
     pub fn virgin_curve_v(&self, displacement_mm: f64, level_v: f64) -> f64 {

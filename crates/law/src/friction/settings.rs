@@ -32,6 +32,18 @@ pub struct FrictionSettings {
 }
 
 impl FrictionSettings {
+    /// The static model and the GMS elements, the same in both senses of motion; no parameters of Dahl's and the LuGre
+    /// model.
+    pub fn new(sliding: StaticFriction, gms: GmsParameters) -> Self {
+        Self {
+            sliding: PerDirection::both(sliding),
+            gms,
+            smoothed_gms: SmoothedGmsParameters::DEFAULT,
+            dahl: None,
+            lugre: None,
+        }
+    }
+
     /// The mean of both directions' breakaway levels, V.
     pub fn mean_breakaway_v(&self) -> f64 {
         let PerDirection { positive, negative } = &self.sliding;

@@ -42,4 +42,9 @@ impl MotionScale {
             rate_hz,
         }
     }
+
+    /// The control period, s.
+    pub const fn period_s(self) -> f64 {
+        1.0 / self.rate_hz
+    }
 }

@@ -7,11 +7,12 @@ use quadrant_law::command::Command;
 use quadrant_law::control::feedback::{Feedback, LawKind};
 use quadrant_law::control::pid::{Pid, PidGains};
 use quadrant_law::encoder::EncoderReading;
+use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::injection::{Coupling, Injection};
-use quadrant_law::reference::Motion;
+use quadrant_law::reference::{Motion, MotionScale};
 use quadrant_law::safety::{AxisSwitches, FaultCode, Switches};
 use quadrant_law::stage::StageState;
-use quadrant_law::units::Position;
+use quadrant_law::units::{DacCode, Position};
 use quadrant_settings::{PlanSettings, StageSettings};
 
 use quadrant_test_support::{Rig, sine_on_x, with_x, x_alone};
@@ -110,6 +111,47 @@ fn an_axis_is_not_made_of_parts_that_cannot_be_and_the_first_is_named() {
 }
 
 #[test]
+fn an_axis_by_value_is_the_axis_in_place() {
+    let scale = MotionScale::new(RESOLUTION_MM, 1e4);
+    let x = &StageSettings::simulated().axes[0];
+    let gains = &x.feedback.pid;
+    let kind = FeedforwardKind::Combined;
+    let by_value = Axis::<f64, 4>::build(scale, |axis| {
+        axis.amplifier(10.0, 10.0, 0.0, false)
+            .pid(gains, 2.0)
+            .feedforward(kind, &x.feedforward.gains, &x.friction, 12)
+    });
+    let mut in_place = Axis::<f64, 4>::blank();
+    AxisBuilder::new(&mut in_place, RESOLUTION_MM, PERIOD_S)
+        .amplifier(10.0, 10.0, 0.0, false)
+        .feedback(Feedback::Pid(Pid::build(gains, 2.0, PERIOD_S)))
+        .feedforward(kind, &x.feedforward.gains, &x.friction, 12)
+        .try_build()
+        .expect("valid");
+    assert_eq!(by_value, Ok(in_place));
+}
+
+#[test]
+fn an_axis_by_value_is_refused_as_in_place() {
+    let refused = |resolution_mm, rate_hz| {
+        Axis::<f64, 4>::build(MotionScale::new(resolution_mm, rate_hz), |axis| axis).err()
+    };
+    assert_eq!(refused(0.0, 1e4), Some(AxisError::Resolution(0.0)));
+    assert_eq!(
+        refused(RESOLUTION_MM, 0.0),
+        Some(AxisError::Period(f64::INFINITY))
+    );
+    assert_eq!(
+        refused(RESOLUTION_MM, -1e4),
+        Some(AxisError::Period(-PERIOD_S))
+    );
+    assert_eq!(
+        refused(RESOLUTION_MM, 1e4),
+        Some(AxisError::OutputLimit(0.0))
+    );
+}
+
+#[test]
 fn a_tick_of_one_axis_reads_follows_and_puts_out() {
     let mut axis = Axis::<f64, 4>::blank();
     AxisBuilder::new(&mut axis, RESOLUTION_MM, PERIOD_S)
@@ -179,7 +221,7 @@ fn what_is_seen_of_an_axis_whose_outputs_are_off_is_where_it_is() {
     }
     let driven = *rig.state.axes()[0].telemetry();
     assert_ne!(driven.output_v(), 0.0);
-    let volts = f32::from(driven.code.0) / 32767.0 * 10.0;
+    let volts = driven.code.to_volts(10.0) as f32;
     assert!((driven.output_v() - volts).abs() < 2e-4);
     rig.command(Command::Disable);
     rig.inputs.set_counts([70, 0, 0]);
@@ -225,7 +267,7 @@ fn word_of_pushed_axis(away: i32, injected_word: i16) -> i16 {
     let injection = Injection::new(
         AxisName::X,
         Coupling::Added,
-        10.0 / 32767.0,
+        10.0 / DacCode::FULL_SCALE,
         Position::from_mm(90.0, 5e-4),
         1e6,
     );
@@ -266,7 +308,7 @@ fn a_voltage_beyond_the_limit_is_shown_as_limited_also_in_open_loop() {
     let injection = Injection::new(
         AxisName::X,
         Coupling::OpenLoop,
-        2.0 * full_scale_v / 32767.0,
+        2.0 * full_scale_v / DacCode::FULL_SCALE,
         Position::from_mm(5.0, 5e-4),
         100.0,
     );

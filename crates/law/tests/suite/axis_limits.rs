@@ -7,6 +7,7 @@ use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_law::units::DacCode;
 use quadrant_settings::{AxisSettings, StageSettings};
 
 use quadrant_test_support::{Rig, repeatable, sine_on_x, with_x};
@@ -31,7 +32,7 @@ fn limited(kind: FeedforwardKind, law: LawKind) -> StageSettings {
 }
 
 /// 2.1 V of 5 V, and half a code of rounding.
-const MOST_CODE: f64 = 2.1 / 5.0 * 32767.0 + 1.0;
+const MOST_CODE: f64 = 2.1 / 5.0 * DacCode::FULL_SCALE + 1.0;
 
 fn check<S: Scalar>(rig: &mut Rig<S>) -> Result<bool, TestCaseError> {
     let outputs = rig.tick();

@@ -11,7 +11,7 @@ use quadrant_law::reference::{MotionSettings, PointToPointSettings, ReferenceSam
 use quadrant_law::safety::FaultCode;
 use quadrant_law::safety::oscillation::{OscillationKind, OscillationReading};
 use quadrant_law::scalar::{Fixed, Scalar};
-use quadrant_law::units::Position;
+use quadrant_law::units::{DacCode, Position};
 use quadrant_settings::stream_planner::{AxisPoint, SetPoint, StreamLimits, StreamPlanner};
 use quadrant_settings::{AxisSettings, InjectionSettings, PlanSettings, StageSettings};
 
@@ -222,8 +222,8 @@ impl<S: Scalar> Bench<S> {
             self.words += 1;
             // Without a frequency, a constant voltage.
             let wave = if hz > 0.0 { turn.sin() } else { 1.0 };
-            let word = volts * wave / 10.0 * 32767.0;
-            self.rig.state.offer_voltage(word.round() as i16, false);
+            let word = DacCode::from_volts(volts * wave, 10.0);
+            self.rig.state.offer_voltage(word.0, false);
         }
     }
 
@@ -249,7 +249,7 @@ impl<S: Scalar> Bench<S> {
         }
         let outputs = self.rig.tick();
         self.enabled = outputs.enabled;
-        let volts = f64::from(outputs.codes[0].0) / 32767.0 * 10.0;
+        let volts = outputs.codes[0].to_volts(10.0);
         self.plant.step(if outputs.enabled { volts } else { 0.0 });
         self.ticks += 1;
     }

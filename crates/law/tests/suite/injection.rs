@@ -12,6 +12,7 @@ use quadrant_law::reference::Velocity;
 use quadrant_law::safety::FaultCode;
 use quadrant_law::scalar::{Fixed, Scalar};
 use quadrant_law::stage::Outputs;
+use quadrant_law::units::DacCode;
 use quadrant_settings::{InjectionSettings, PlanSettings, StageSettings};
 
 use quadrant_test_support::{Rig, any_f32, repeatable, sine_on_x};
@@ -83,7 +84,7 @@ impl<S: Scalar> Bench<S> {
     pub(crate) fn step(&mut self) -> Outputs {
         self.rig.inputs.readings[0].count = (self.position_mm / 5e-4).round() as i32 as u32;
         let outputs = self.tick();
-        let volts = 10.0 * f64::from(outputs.codes[0].0) / 32767.0;
+        let volts = outputs.codes[0].to_volts(10.0);
         let acceleration = 70_000.0 * volts - 150.0 * self.velocity_mm_s;
         self.velocity_mm_s += 1e-4 * acceleration;
         self.position_mm += 1e-4 * self.velocity_mm_s;
@@ -169,7 +170,7 @@ fn the_output_limit_holds_whatever_is_injected() {
         let mut bench = Bench::<f32>::new(&settings, &PlanSettings::default());
         bench.begin(&request(open_loop), &[30_000; 3]);
         let codes = [bench.tick(), bench.tick()].map(|outputs| outputs.codes[0].0);
-        let limit = (2.0 / 10.0 * 32_767.0_f64).round() as i16;
+        let limit = DacCode::from_volts(2.0, 10.0).0;
         assert_eq!(codes, [limit; 2], "{open_loop}");
     }
 }

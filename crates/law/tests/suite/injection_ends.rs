@@ -22,7 +22,7 @@ fn the_loop_is_closed_without_a_bump_from_a_moving_axis() {
     let mut most_mm: f64 = 0.0;
     for tick in 0..2_000 {
         let outputs = bench.step();
-        let volts = 10.0 * f64::from(outputs.codes[0].0) / 32_767.0;
+        let volts = outputs.codes[0].to_volts(10.0);
         if tick == 0 {
             // What braking takes, and no more.
             assert!(volts.abs() < 1.0, "{volts}");

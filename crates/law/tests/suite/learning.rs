@@ -88,7 +88,7 @@ impl<S: Scalar> Axis<S> {
         let phase = std::f64::consts::TAU * hz * f64::from(self.ticks) * PERIOD_S;
         self.ticks += 1;
         let load_v = self.pushed_v + amplitude_v * phase.sin();
-        self.plant.step(f64::from(x.0) / 32_767.0 * 10.0 + load_v);
+        self.plant.step(x.to_volts(10.0) + load_v);
     }
 
     /// Runs for a time; returns the mean square of the error, mm^2.

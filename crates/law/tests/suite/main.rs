@@ -59,3 +59,4 @@ mod structural_filters;
 mod supervisor;
 mod surface_laws;
 mod switches;
+mod units;

@@ -11,6 +11,7 @@ use quadrant_law::safety::FaultCode;
 use quadrant_law::safety::plausibility::{
     Plausibility, PlausibilityModel, PlausibilityState, Shown, Words,
 };
+use quadrant_law::units::DacCode;
 use quadrant_settings::StageSettings;
 
 use quadrant_test_support::Rig;
@@ -30,11 +31,11 @@ const SPEED: f64 = PERIOD_S / COUNT_MM * 256.0;
 
 const AMPLIFIERS: [Words; 3] = [
     Words {
-        per_volt: 3276.7,
+        per_volt: DacCode::FULL_SCALE / 10.0,
         offset: 0,
     },
     Words {
-        per_volt: 3276.7,
+        per_volt: DacCode::FULL_SCALE / 10.0,
         offset: 250,
     },
     Words {
@@ -251,7 +252,7 @@ impl Moved {
             let count = (self.plant.position_mm / COUNT_MM).floor() as i64 + self.origin;
             self.rig.inputs.readings[0].count = count as u32;
             let outputs = self.rig.tick();
-            let volts = f64::from(outputs.codes[0].0) / 32767.0 * 10.0;
+            let volts = outputs.codes[0].to_volts(10.0);
             self.plant.step(if outputs.enabled { volts } else { 0.0 });
         }
     }

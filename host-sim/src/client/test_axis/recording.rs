@@ -135,7 +135,7 @@ mod tests {
         let mut settings = x_axis();
         settings.amplifier.reversed = true;
         settings.amplifier.offset_v = 0.1;
-        let offset = (0.1 * 32767.0 / settings.amplifier.full_scale_v).round() as i16;
+        let DacCode(offset) = DacCode::from_volts(0.1, settings.amplifier.full_scale_v);
         let codes = [0, 2, 100, 300, -7, -9, 0, 0].map(|code: i16| offset - code);
         let far = 30_000_000;
         let injected = Injected {
@@ -151,7 +151,7 @@ mod tests {
         };
         let recording = shape.recording(&samples(far, &codes)).unwrap();
         // From the first sample after the first value: ticks 103 and 104, 105 and 106.
-        let volts = settings.amplifier.full_scale_v / 32767.0;
+        let volts = settings.amplifier.full_scale_v / DacCode::FULL_SCALE;
         let expected = [200.0 * volts, -8.0 * volts];
         for (found, expected) in recording.voltage_v.iter().zip(expected) {
             assert!((found - expected).abs() < 1e-9, "{recording:?}");

@@ -140,7 +140,7 @@ impl SimulatedTestAxis {
     }
 
     fn code(&self, volts: f64) -> DacCode {
-        DacCode::saturating((volts / self.full_scale_v * DacCode::FULL_SCALE).round() as i32)
+        DacCode::from_volts(volts, self.full_scale_v)
     }
 
     /// Runs the experiment until it ends; what follows, the outputs off, is the caller's.
