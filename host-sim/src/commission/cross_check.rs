@@ -1,5 +1,6 @@
 //! Cross-checks of a finished commissioning: the response at rest, which friction bends, and an ordinary motion.
 
+use quadrant_law::safety::FaultCode;
 use quadrant_settings::AxisSettings;
 
 use super::bootstrap::measuring_settings;
@@ -9,7 +10,7 @@ use crate::identify::excitation::{Excitation, Waveform};
 use crate::identify::motion::{Candidate, MotionFitSettings, fit_motion, recommended, shuttle};
 use crate::identify::response::FrequencyResponse;
 use crate::identify::revise::{ReviseError, Revision};
-use crate::machine::{TestAxis, approach};
+use crate::machine::{ExperimentError, TestAxis, approach};
 use crate::record::Recording;
 
 /// Results of the cross-checks.
@@ -25,13 +26,12 @@ pub struct CrossCheck {
     pub recordings: [Recording; 2],
 }
 
-/// RMS of the excitation at rest over the friction at breakaway: enough to slide most of the time.
-const EXCITATION_RATIO: f64 = 2.6;
-/// Lowest frequencies of the excitation, Hz, one after the other until the axis stays within its bounds of way and velocity.
-const LOWEST_HZ: [f64; 3] = [4.0, 10.0, 25.0];
+/// Lowest frequencies of the excitation, Hz, each with its RMS over the friction at breakaway: one after the other, until the axis stays
+/// within its bounds of way and velocity. With the first it slides most of the time.
+const EXCITATIONS: [(f64, f64); 4] = [(4.0, 2.6), (10.0, 2.6), (25.0, 2.0), (60.0, 1.5)];
 /// Highest frequency of the excitation, Hz.
 const HIGHEST_HZ: f64 = 400.0;
-/// Period of the excitation, s, and its periods.
+/// Period of the excitation, s.
 const PERIOD_S: f64 = 0.5;
 /// Periods of the excitation.
 const PERIODS: usize = 12;
@@ -52,33 +52,36 @@ impl CrossCheck {
         let sliding = &settings.friction.sliding;
         let breakaway_v =
             0.5 * (sliding.positive.curve.breakaway_v + sliding.negative.curve.breakaway_v);
-        let excitation = |lowest_hz| Excitation {
+        let excitation = |(lowest_hz, ratio)| Excitation {
             waveform: Waveform::Multisine,
-            rms_v: EXCITATION_RATIO * breakaway_v,
+            rms_v: ratio * breakaway_v,
             band_hz: (lowest_hz, HIGHEST_HZ),
             rise_hz: 0.0,
             period_s: PERIOD_S,
             seed,
         };
-        let mut measure = |lowest_hz| {
+        let mut measure = |tried| {
             test_axis.apply(&measuring_settings(settings))?;
             approach(test_axis, 0.0)?;
             AtRest::measure(
                 test_axis,
                 settings,
-                excitation(lowest_hz),
+                excitation(tried),
                 PERIODS,
                 &mut |share| {
                     progress("response at rest", share);
                 },
             )
         };
-        let [first_hz, others @ ..] = LOWEST_HZ;
-        let mut at_rest = measure(first_hz);
-        for lowest_hz in others {
+        let strayed = |error: &ExperimentError| {
+            error.strayed() || error.fault() == Some(FaultCode::InjectionBounds)
+        };
+        let [first, others @ ..] = EXCITATIONS;
+        let mut at_rest = measure(first);
+        for gentler in others {
             match &at_rest {
-                Err(ReviseError::Experiment(error)) if error.strayed() => {
-                    at_rest = measure(lowest_hz);
+                Err(ReviseError::Experiment(error)) if strayed(error) => {
+                    at_rest = measure(gentler);
                 }
                 _ => break,
             }

@@ -9,7 +9,7 @@ use clap::Args;
 
 use super::cases::table;
 use super::page::page;
-use super::{Line, Outcome, RandomAxis, judged};
+use super::{Judging, Line, Outcome, RandomAxis, judged};
 use crate::campaign::{Campaign, Seeded};
 use quadrant_cli::{say, warn};
 
@@ -64,7 +64,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
 /// Commissions the axis of a seed, judges the result, and leaves its page in a folder.
 fn judge_with_page(seed: u64, folder: Option<&Path>) -> Line {
     let subject = RandomAxis::new(seed).subject();
-    let judged = judged(&subject, super::Path::of(seed));
+    let judged = judged(&subject, super::Path::of(seed), Judging::SmallToo);
     if let Some(folder) = folder {
         let path = folder.join(format!("{seed}.html"));
         // The result is worth more than its page.
@@ -85,6 +85,7 @@ fn summary(lines: &BTreeMap<u64, Line>) {
         Outcome::Commissioned,
         Outcome::PidAlone,
         Outcome::WorseThanPid,
+        Outcome::WorseWhenSmall,
         Outcome::Refused,
         Outcome::RefusedWrongly,
         Outcome::LeftTravel,
@@ -144,6 +145,17 @@ fn summary(lines: &BTreeMap<u64, Line>) {
             line.seed,
             100.0 * line.worst_ratio.unwrap_or(f64::NAN),
             line.feedforward,
+            line.axis
+        );
+    }
+    let mut small: Vec<&Line> = lines.values().filter(|line| line.small_worse > 0).collect();
+    small.sort_by_key(|line| std::cmp::Reverse(line.small_worse));
+    for line in small.iter().take(LISTED) {
+        say!(
+            "{:>6}  worse on {} small slow sines, at worst {}: {}",
+            line.seed,
+            line.small_worse,
+            line.small_sine,
             line.axis
         );
     }

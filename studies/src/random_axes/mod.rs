@@ -44,6 +44,8 @@ pub enum Outcome {
     PidAlone,
     /// The chosen settings are worse than the PID on a motion that the commissioning did not see.
     WorseThanPid,
+    /// Settings were chosen that are worse than the PID on small slow sines alone.
+    WorseWhenSmall,
     /// The commissioning ended early, and its reason names the resonance that the axis has.
     Refused,
     /// It ended early for another reason, though every axis of the campaign can be controlled.
@@ -113,6 +115,15 @@ const SLOW_MM_S: [f64; 5] = [0.2, 0.35, 0.5, 0.8, 1.5];
 const WORSE: f64 = 1.02;
 /// Share of the travel that a judging sine takes at most.
 const MOST_TRAVEL: f64 = 0.4;
+
+/// Sines that a result is judged on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Judging {
+    /// The usual ones.
+    Usual,
+    /// The small slow ones, too: twenty times as many.
+    SmallToo,
+}
 
 /// Way from the commissioning to the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -231,7 +242,7 @@ pub fn judge(seed: u64) -> Line {
 
 /// Commissions an axis and judges the result.
 pub fn judge_subject(subject: &Subject, path: Path) -> Line {
-    judged(subject, path).line
+    judged(subject, path, Judging::Usual).line
 }
 
 /// The result of a commissioning, and the largest distance of the table from the middle of its travel, mm.
@@ -305,7 +316,7 @@ fn run(axis: &mut dyn TestAxis, base: &AxisSettings) -> Result<Commissioned, Com
 }
 
 /// Commissions an axis and judges the result, with everything that was tried.
-fn judged(subject: &Subject, path: Path) -> Judged {
+fn judged(subject: &Subject, path: Path, judging: Judging) -> Judged {
     let began = Instant::now();
     let Subject {
         seed,
@@ -344,7 +355,7 @@ fn judged(subject: &Subject, path: Path) -> Judged {
     };
     let found = match tested.found {
         Ok(found) => {
-            line.fill(&found, subject);
+            line.fill(&found, subject, judging);
             Some(found)
         }
         Err(error) => {
@@ -387,7 +398,7 @@ fn names_resonance(error: &CommissionError, subject: &Subject) -> bool {
 const NAMED: f64 = 1.5;
 
 impl Line {
-    fn fill(&mut self, found: &Commissioned, subject: &Subject) {
+    fn fill(&mut self, found: &Commissioned, subject: &Subject, judging: Judging) {
         let trials = found.verification.as_ref();
         let trials = trials.filter(|trials| trials.is_better_than_pid());
         self.trial_worst = trials.map(|trials| trials.against_pid(trials.chosen()).0);
@@ -421,39 +432,6 @@ impl Line {
         };
         let count_mm = subject.parameters.resolution_mm;
         let is_worse = |[own, pid]: &[f64; 2]| own / pid > WORSE && own - pid > count_mm;
-        let slow = SMALL_MM.iter().flat_map(|&amplitude_mm| {
-            SLOW_MM_S.iter().map(move |&velocity_mm_s| SineTest {
-                amplitude_mm,
-                velocity_mm_s,
-            })
-        });
-        let small: Result<Vec<(SineTest, [f64; 2])>, String> =
-            slow.map(|sine| Ok((sine, pair(&sine)?))).collect();
-        let small = match small {
-            Ok(small) => small,
-            Err(reason) => {
-                self.outcome = Outcome::WorseThanPid;
-                self.reason = reason;
-                return;
-            }
-        };
-        let worse = small.iter().filter(|(_, errors)| is_worse(errors));
-        let worse: Vec<_> = worse.collect();
-        self.small_worse = worse.len();
-        let ratio = |errors: &[f64; 2]| errors[0] / errors[1];
-        let worst = worse
-            .into_iter()
-            .max_by(|a, b| ratio(&a.1).total_cmp(&ratio(&b.1)));
-        if let Some((sine, errors)) = worst {
-            self.small_ratio = Some(ratio(errors));
-            self.small_sine = format!(
-                "{} mm at {} mm/s: {:.1} um for {:.1}",
-                sine.amplitude_mm,
-                sine.velocity_mm_s,
-                1e3 * errors[0],
-                1e3 * errors[1]
-            );
-        }
         let errors_mm: Result<Vec<[f64; 2]>, String> = SINES.iter().map(pair).collect();
         match errors_mm {
             Ok(errors_mm) => {
@@ -463,7 +441,7 @@ impl Line {
                 self.mean_ratio = Some(mean);
                 let largest_mm = errors_mm.iter().map(|[_, pid]| *pid);
                 self.pid_um = Some(1e3 * largest_mm.fold(0.0, f64::max));
-                let worse = errors_mm.iter().any(is_worse) || self.small_worse > 0;
+                let worse = errors_mm.iter().any(is_worse);
                 self.outcome = if worse {
                     Outcome::WorseThanPid
                 } else {
@@ -473,6 +451,47 @@ impl Line {
             Err(reason) => {
                 self.outcome = Outcome::WorseThanPid;
                 self.reason = reason;
+            }
+        }
+        if judging == Judging::SmallToo && self.outcome == Outcome::Commissioned {
+            self.judge_small(pair, is_worse);
+        }
+    }
+
+    /// Judges the small slow sines. `pair` runs one, and gives the largest error and that of the PID, mm.
+    fn judge_small(
+        &mut self,
+        pair: impl Fn(&SineTest) -> Result<[f64; 2], String>,
+        is_worse: impl Fn(&[f64; 2]) -> bool,
+    ) {
+        let ratio = |errors: &[f64; 2]| errors[0] / errors[1];
+        for amplitude_mm in SMALL_MM {
+            for velocity_mm_s in SLOW_MM_S {
+                let sine = SineTest {
+                    amplitude_mm,
+                    velocity_mm_s,
+                };
+                let errors = match pair(&sine) {
+                    Ok(errors) => errors,
+                    Err(reason) => {
+                        self.outcome = Outcome::WorseWhenSmall;
+                        self.reason = reason;
+                        return;
+                    }
+                };
+                if !is_worse(&errors) {
+                    continue;
+                }
+                self.outcome = Outcome::WorseWhenSmall;
+                self.small_worse += 1;
+                if self.small_ratio.is_none_or(|worst| ratio(&errors) > worst) {
+                    self.small_ratio = Some(ratio(&errors));
+                    self.small_sine = format!(
+                        "{amplitude_mm} mm at {velocity_mm_s} mm/s: {:.1} um for {:.1}",
+                        1e3 * errors[0],
+                        1e3 * errors[1]
+                    );
+                }
             }
         }
     }
