@@ -6,7 +6,7 @@
 //! - [`controls`]: the settings that the page offers, from the table of all settings;
 //! - [`loop_response`]: the open loop over frequency, with the plant of the settings and with the stage's own;
 //! - [`request`]: requests of the page, and their replies, as JSON;
-//! - [`ask`], [`session`], [`told`]: the page's end of the link to a machine: requests by name, frames, what comes back;
+//! - [`ask`], [`session`], [`wording`]: the page's end of the link to a machine: requests by name, frames, what comes back;
 //! - `exports`: the functions that WebAssembly calls.
 //!
 //! The same code runs on the host, where a test compares every converter word with the browser's.
@@ -20,5 +20,5 @@ mod exports;
 pub mod loop_response;
 pub mod request;
 pub mod session;
-pub mod told;
 pub mod truth;
+pub mod wording;

@@ -14,7 +14,7 @@ use quadrant_simulation::setting_value;
 use serde_json::{Value, json};
 
 use crate::ask::Ask;
-use crate::told;
+use crate::wording;
 
 /// Control rate until the machine has reported its own, Hz.
 const RATE_HZ: f64 = 10_000.0;
@@ -95,7 +95,7 @@ impl Session {
                 }
                 Ok(Message::Notice(Notice::Telemetry(block))) => self.sample(&block, samples),
                 Ok(Message::Notice(Notice::Event { tick, event, .. })) => {
-                    messages.push(json!({ "event": told::event(tick, &event, self.rate_hz) }));
+                    messages.push(json!({ "event": wording::event(tick, &event, self.rate_hz) }));
                 }
                 Ok(Message::Notice(Notice::Log(text))) => messages.push(json!({ "log": text })),
                 Err(error @ DecodeError::Version(_)) => {
@@ -130,13 +130,13 @@ impl Session {
                 self.rate_hz = identity.rate_hz;
                 json!(identity)
             }
-            Reply::Status(status) => told::status(&status, self.rate_hz),
-            Reply::Inputs(inputs) => told::inputs(&inputs),
-            Reply::Fault(fault) => told::fault(fault.as_ref(), self.rate_hz),
+            Reply::Status(status) => wording::status(&status, self.rate_hz),
+            Reply::Inputs(inputs) => wording::inputs(&inputs),
+            Reply::Fault(fault) => wording::fault(fault.as_ref(), self.rate_hz),
             Reply::Paths(page) => json!(page),
             Reply::Value(value) => return self.value(body, &value),
             Reply::Applied(applied) => json!({
-                "axes": told::names(applied.changed),
+                "axes": wording::names(applied.changed),
                 "restart_needed": applied.restart_needed,
             }),
             Reply::Telemetry { generation } => self.select(body, generation),
@@ -157,7 +157,7 @@ impl Session {
             // It was taken by settings with every part; these may lack the part, which changes no bound.
             let _ = self.settings.set_bytes(path, value.kind, &value.bytes);
         }
-        Ok(told::setting(path, json, &self.settings))
+        Ok(wording::setting(path, json, &self.settings))
     }
 
     /// Takes samples of what was selected from now on, and returns their channels and time apart, s.

@@ -25,17 +25,21 @@ impl LawSettings {
     /// # Errors
     /// A file that cannot be read, or settings that the firmware would refuse.
     pub fn read(&self) -> Result<SettingsFile, SettingsFileError> {
-        let identified = identified_settings()?;
         let Some(path) = &self.path else {
-            return Ok(identified);
+            return identified_settings();
         };
         let mut file = SettingsFile::read(path)?;
-        for axis in AxisName::ALL {
-            let own = &mut file.stage.axes[axis as usize];
-            if own.commissioned || own.feedback.pid.kp_v_per_mm != 0.0 {
-                continue;
-            }
-            *own = identified.stage.axes[axis as usize].clone();
+        let mut inert = AxisName::ALL.to_vec();
+        inert.retain(|axis| {
+            let own = &file.stage.axes[*axis as usize];
+            !own.commissioned && own.feedback.pid.kp_v_per_mm == 0.0
+        });
+        if inert.is_empty() {
+            return Ok(file);
+        }
+        let identified = identified_settings()?;
+        for axis in inert {
+            file.stage.axes[axis as usize] = identified.stage.axes[axis as usize].clone();
             warn!(
                 "note: {axis} is not commissioned in {}: it runs under the settings that came of commissioning the simulated stage",
                 path.display()

@@ -6,7 +6,7 @@ use quadrant_fault_bench::tasks::Tasks;
 use crate::preemption;
 
 #[test]
-fn a_host_that_asks_while_the_brake_moves_is_told_to_ask_again() {
+fn a_host_that_asks_while_the_brake_moves_has_to_ask_again() {
     let mut settings = preemption::settings();
     (settings.brake.release_s, settings.brake.apply_s) = (0.1, 0.1);
     let mut tasks = Tasks::new(&settings, 1);

@@ -1,4 +1,4 @@
-//! What the firmware is made of on the host: tasks, server, store, drivers, wiring.
+//! Parts of the firmware on the host: tasks, server, store, drivers, wiring.
 
 mod board_wiring;
 mod brake_over_link;

@@ -17,13 +17,13 @@ fn what_is_found_becomes_an_event_once() {
         swings: 29_008,
     };
     let mut supervision = Supervision::new([5e-4; 3]);
-    let mut told = || {
+    let mut reported = || {
         let events = supervision.run(&snapshot, None).events;
-        let told = events.into_iter().filter_map(|event| match event {
+        let reported = events.into_iter().filter_map(|event| match event {
             Event::Oscillated(found) => Some(found),
             _ => None,
         });
-        told.collect::<Vec<_>>()
+        reported.collect::<Vec<_>>()
     };
     let found = Oscillated {
         axis: AxisName::X,
@@ -31,6 +31,6 @@ fn what_is_found_becomes_an_event_once() {
         decihertz: 2589,
         micrometres: 7,
     };
-    assert_eq!(told(), [found]);
-    assert_eq!(told(), []);
+    assert_eq!(reported(), [found]);
+    assert_eq!(reported(), []);
 }

@@ -6,7 +6,7 @@ use quadrant_law::stage::{Inputs, Stage, StageState};
 use quadrant_settings::{PlanSettings, StageSettings};
 
 #[test]
-fn the_index_pulse_that_an_encoder_has_shown_is_told_of_that_axis_alone() {
+fn the_index_pulse_that_an_encoder_has_shown_is_reported_of_that_axis_alone() {
     let settings = StageSettings::simulated();
     let stage: Stage<f32, FIRMWARE_ELEMENTS> = settings.build().expect("valid settings");
     let plan = PlanSettings::default().build(&settings).expect("no motion");

@@ -298,8 +298,13 @@ fn resumed(experiments: &Path, words: &str) -> anyhow::Result<(String, Begun)> {
     }
 }
 
-/// The travel that was given at the beginning, of an axis that has moved since.
-fn again(axis: AxisName, given: Travel, began_mm: f64, at_mm: f64) -> anyhow::Result<Travel> {
+/// The travel of the beginning for an axis that has moved since to `at_mm`.
+fn again(axis: AxisName, begun: &Begun, at_mm: f64) -> anyhow::Result<Travel> {
+    let Begun {
+        at_mm: began_mm,
+        travel: given,
+        ..
+    } = *begun;
     let moved_mm = at_mm - began_mm;
     let travel = Travel {
         negative_mm: given.negative_mm + moved_mm,
@@ -322,7 +327,7 @@ impl Job<'_> {
     pub(super) fn run(self, machine: &mut dyn Machine) -> anyhow::Result<Done> {
         let Self { axis, output, .. } = self;
         output.ready()?;
-        let mut travel = known_travel(machine, axis, self.travel)?;
+        let travel = known_travel(machine, axis, self.travel)?;
         let before = machine.settings()?;
         let mut file = match self.start {
             Some(file) => {
@@ -343,27 +348,25 @@ impl Job<'_> {
         let words = self
             .request
             .words(output.seed, self.travel, self.stage, &base);
-        let mut start_mm = travel.start_mm();
-        let mut begun = Begun {
-            words,
-            at_mm: machine.position_mm(axis)?,
-        };
-        if self.request.resume {
-            let (text, first) = resumed(&experiments, &begun.words)?;
+        let at_mm = machine.position_mm(axis)?;
+        let begun = if self.request.resume {
+            let (text, begun) = resumed(&experiments, &words)?;
             warn!("{text}");
-            if let Some(given) = self.travel {
-                start_mm = given.start_mm();
-                travel = again(axis, given, first.at_mm, begun.at_mm)?;
+            begun
+        } else {
+            Begun {
+                words,
+                at_mm,
+                travel,
             }
-            begun = first;
-        }
+        };
+        let travel = again(axis, &begun, at_mm)?;
         let outcome = {
             let mut test_axis = machine.test_axis(axis, travel)?;
             let mut journal = Journal::open(&mut *test_axis, &experiments, self.request.resume)
-                .with_context(|| format!("cannot keep experiments in {}", experiments.display()))?
-                .begun_at(start_mm);
+                .with_context(|| format!("cannot keep experiments in {}", experiments.display()))?;
             journal
-                .keep_begun(&begun)
+                .begin(&begun)
                 .with_context(|| format!("cannot write into {}", experiments.display()))?;
             for path in journal.foreign() {
                 warn!("{} was not written here, and stays", path.display());
@@ -951,16 +954,18 @@ mod tests {
 
     #[test]
     fn a_resumed_axis_keeps_the_travel_that_it_was_begun_with_wherever_it_stands() {
-        let given = Travel {
-            negative_mm: 3.0,
-            positive_mm: 20.0,
+        let begun = Begun {
+            words: String::new(),
+            at_mm: 100.0,
+            travel: Travel {
+                negative_mm: 3.0,
+                positive_mm: 20.0,
+            },
         };
         // Begun at 100 mm, interrupted at 106: from 97 to 120 mm as before.
-        let travel = again(AxisName::X, given, 100.0, 106.0).unwrap();
+        let travel = again(AxisName::X, &begun, 106.0).unwrap();
         assert_eq!((travel.negative_mm, travel.positive_mm), (9.0, 14.0));
-        let refused = again(AxisName::X, given, 100.0, 0.0)
-            .unwrap_err()
-            .to_string();
+        let refused = again(AxisName::X, &begun, 0.0).unwrap_err().to_string();
         for part in [
             "stands at 0.000 mm",
             "97.000 and 120.000",

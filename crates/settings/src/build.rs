@@ -39,7 +39,7 @@ const FRICTION_ERROR: f64 = 1.5;
 const SILENT_FRICTIONS: f64 = 2.0;
 /// Least share of breakaway that friction takes up, even if the settings call it stiffer.
 const HELD_FRICTIONS: f64 = 0.65;
-/// What friction takes up on an axis that stands after it slid, over breakaway.
+/// Friction of an axis that stands after it slid, over breakaway.
 const STUCK_FRICTIONS: f64 = 0.75;
 /// The same on an axis that slides.
 const SLIDING_FRICTIONS: f64 = 1.0;

@@ -14,7 +14,7 @@ use quadrant_law::supervisor::{Event, PERIOD_TICKS, Supervisor};
 use quadrant_settings::Job;
 use quadrant_settings::SettingsError;
 
-/// What a machine reads in a tick: the law's inputs, and a person's request to the supervisor.
+/// Inputs of a machine in a tick: the law's inputs, and a person's request to the supervisor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TickInput {
     /// The encoders' readings.

@@ -2,7 +2,7 @@
 //!
 //! Everything here works on [`OpenLoop`], a frequency response with a band: the continuous textbook form, the exact
 //! sampled form with the controller's own difference equations, or anything else that answers with a complex number.
-//! How much *nonlinear* gain a design then allows is [`quadrant_settings::popov::sector_bound`]'s answer.
+//! The *nonlinear* gain that a design then allows is [`quadrant_settings::popov::sector_bound`]'s answer.
 
 mod bandwidth;
 pub mod best;

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::approach::approach;
 use super::error::MachineError;
 use super::test_axis::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis};
+use super::travel::Travel;
 use crate::record::Recording;
 use crate::report::whole;
 
@@ -38,8 +39,8 @@ pub struct Journal<'a> {
     interrupted: Option<Recording>,
     /// Position at the end of the last experiment that was in the folder, mm.
     left_at_mm: Option<f64>,
-    /// Position at which the axis stood when the series was begun, mm from the middle of its travel.
-    start_mm: f64,
+    /// Travel of the axis from where it stood when the series was begun.
+    travel: Option<Travel>,
     /// Files in the folder that no journal has written: they stay.
     foreign: Vec<PathBuf>,
 }
@@ -51,6 +52,8 @@ pub struct Begun {
     pub words: String,
     /// The machine's position of the axis, mm.
     pub at_mm: f64,
+    /// The travel from there.
+    pub travel: Travel,
 }
 
 /// An experiment that has ended.
@@ -205,7 +208,7 @@ impl<'a> Journal<'a> {
         is_there(folder)?;
         Ok(Self {
             settings: axis.settings().clone(),
-            start_mm: axis.info().start_mm,
+            travel: None,
             axis,
             folder: folder.to_owned(),
             next: 0,
@@ -215,13 +218,6 @@ impl<'a> Journal<'a> {
             left_at_mm: None,
             foreign,
         })
-    }
-
-    /// The same series for an axis that stood at `start_mm` from the middle of its travel when it was begun.
-    #[must_use]
-    pub fn begun_at(mut self, start_mm: f64) -> Self {
-        self.start_mm = start_mm;
-        self
     }
 
     /// Files that were in the folder, and that no journal has written: they were not deleted.
@@ -264,23 +260,41 @@ impl<'a> Journal<'a> {
         fs::read_dir(folder).map_or(0, |entries| entries.flatten().filter(kept).count())
     }
 
-    /// Keeps what the experiments are of, for [`begun`](Self::begun).
+    /// Begins a series, or goes on with one: keeps what it is of, for [`begun`](Self::begun), and gives its travel to the experiments.
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn keep_begun(&self, begun: &Begun) -> io::Result<()> {
-        let Begun { words, at_mm } = begun;
-        let text = format!("{words}\n{at_mm}\n");
+    pub fn begin(&mut self, begun: &Begun) -> io::Result<()> {
+        self.travel = Some(begun.travel);
+        let Begun {
+            words,
+            at_mm,
+            travel,
+        } = begun;
+        let text = format!(
+            "{words}\n{at_mm} {} {}\n",
+            travel.negative_mm, travel.positive_mm
+        );
         whole::replace(&self.folder.join(REQUEST), text.into_bytes())
     }
 
-    /// What the experiments in a folder are of, if it was kept.
+    /// The beginning of the series in a folder, if it was kept.
     pub fn begun(folder: &Path) -> Option<Begun> {
         let text = fs::read_to_string(folder.join(REQUEST)).ok()?;
-        let (words, at_mm) = text.trim_end().rsplit_once('\n')?;
+        let (words, numbers) = text.trim_end().rsplit_once('\n')?;
+        let numbers: Vec<f64> = (numbers.split(' '))
+            .map(|number| number.parse().ok())
+            .collect::<Option<_>>()?;
+        let &[at_mm, negative_mm, positive_mm] = numbers.as_slice() else {
+            return None;
+        };
         Some(Begun {
             words: words.to_owned(),
-            at_mm: at_mm.parse().ok()?,
+            at_mm,
+            travel: Travel {
+                negative_mm,
+                positive_mm,
+            },
         })
     }
 
@@ -385,9 +399,15 @@ fn keep(path: &Path, entry: &Entry) -> io::Result<()> {
 
 impl TestAxis for Journal<'_> {
     fn info(&self) -> AxisInfo {
-        AxisInfo {
-            start_mm: self.start_mm,
-            ..self.axis.info()
+        let info = self.axis.info();
+        match self.travel {
+            // To the last bit as it was: experiments are found again by their numbers.
+            Some(travel) => AxisInfo {
+                travel_mm: travel.half_mm(),
+                start_mm: travel.start_mm(),
+                ..info
+            },
+            None => info,
         }
     }
 
@@ -549,6 +569,39 @@ mod tests {
         let mut journal = Journal::open(&mut again, folder.path(), true).unwrap();
         assert!(journal.perform(&too_far(), &mut |_| {}).is_err());
         assert_ne!(again.plant().position_mm(), axis().plant().position_mm());
+    }
+
+    #[test]
+    fn a_series_keeps_the_travel_that_it_was_begun_with_to_the_last_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let begun = Begun {
+            words: "--seed 1 --travel -3..20".to_owned(),
+            at_mm: 100.1,
+            travel: Travel {
+                negative_mm: 3.1,
+                positive_mm: 20.0 / 3.0,
+            },
+        };
+        let mut first = axis();
+        let mut journal = Journal::open(&mut first, folder.path(), false).unwrap();
+        journal.begin(&begun).unwrap();
+        let found = Journal::begun(folder.path()).unwrap();
+        assert_eq!(found, begun);
+        // The axis of the next session stands elsewhere, within the same ends.
+        let moved = Travel {
+            negative_mm: begun.travel.negative_mm + 0.7,
+            positive_mm: begun.travel.positive_mm - 0.7,
+        };
+        let mut again = axis().with_travel(moved);
+        let mut journal = Journal::open(&mut again, folder.path(), true).unwrap();
+        journal.begin(&found).unwrap();
+        let AxisInfo {
+            travel_mm,
+            start_mm,
+            ..
+        } = journal.info();
+        assert_eq!(travel_mm, begun.travel.half_mm());
+        assert_eq!(start_mm, begun.travel.start_mm());
     }
 
     #[test]

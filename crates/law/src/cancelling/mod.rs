@@ -119,7 +119,7 @@ pub struct CancellingSettings {
 }
 
 impl CancellingSettings {
-    /// What stands in settings until somebody chooses.
+    /// The defaults of the settings.
     pub const DEFAULT: Self = Self {
         spindle_rpm: 0.0,
         ramp_rpm_s: 1e4,

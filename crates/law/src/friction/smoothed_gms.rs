@@ -34,7 +34,7 @@ pub struct SmoothedGmsParameters {
 }
 
 impl SmoothedGmsParameters {
-    /// What stands in settings until somebody chooses.
+    /// The defaults of the settings.
     pub const DEFAULT: Self = Self { width: 0.25 };
 }
 

@@ -51,7 +51,7 @@ pub struct LearningSettings {
 }
 
 impl LearningSettings {
-    /// What stands in settings until somebody chooses.
+    /// The defaults of the settings.
     pub const DEFAULT: Self = Self {
         memory_s: 7.0,
         vibration_mm_s: 2.0,

@@ -57,14 +57,14 @@ fn what_switches_off_still_does_while_an_emergency_stop_brakes() {
         rig.inputs.switches = fault;
         follow(&mut rig);
         assert_eq!(rig.tick(), Outputs::default());
-        // What began it is what a person is told.
+        // The first fault is the one that is reported.
         let first = rig.state.safety().fault().expect("latched").code;
         assert_eq!(first, FaultCode::EmergencyStop);
     }
 }
 
 #[test]
-fn an_axis_that_is_pushed_while_the_outputs_are_off_is_told_once_a_push() {
+fn an_axis_that_is_pushed_while_the_outputs_are_off_is_reported_once_a_push() {
     let standing = StageView {
         safety: SafetyState::Disabled,
         commissioned: true,
@@ -79,21 +79,21 @@ fn an_axis_that_is_pushed_while_the_outputs_are_off_is_told_once_a_push() {
         ..standing
     };
     let mut supervisor = Supervisor::default();
-    let mut told = |view, runs| {
+    let mut reported = |view, runs| {
         (0..runs)
             .flat_map(|_| supervisor.step(view, None).events)
             .flatten()
             .filter(|event| matches!(event, Event::MovedWhileOff(AxisName::Y)))
             .count()
     };
-    assert_eq!(told(standing, 200), 0);
-    assert_eq!(told(pushed, 50), 1);
-    assert_eq!(told(standing, 200), 0);
-    assert_eq!(told(pushed, 1), 1);
+    assert_eq!(reported(standing, 200), 0);
+    assert_eq!(reported(pushed, 50), 1);
+    assert_eq!(reported(standing, 200), 0);
+    assert_eq!(reported(pushed, 1), 1);
     // What coasts after it was switched off was not pushed.
-    assert_eq!(told(enabled, 200), 0);
-    assert_eq!(told(standing, 1), 0);
-    assert_eq!(told(pushed, 50), 0);
+    assert_eq!(reported(enabled, 200), 0);
+    assert_eq!(reported(standing, 1), 0);
+    assert_eq!(reported(pushed, 50), 0);
 }
 
 #[test]

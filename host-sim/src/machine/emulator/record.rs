@@ -1,4 +1,4 @@
-//! What a simulated stage gives as the channel's records, and back.
+//! Signals of a simulated stage as the channel's records, and back.
 
 use quadrant::lockstep::InputRecord;
 use quadrant_simulation::law_machine::TickInput;
@@ -14,7 +14,7 @@ pub fn record_of(input: &TickInput) -> InputRecord {
     }
 }
 
-/// What a record says of the inputs of a tick.
+/// Inputs of a tick, from a record.
 pub fn input_of(record: &InputRecord) -> TickInput {
     TickInput {
         readings: record.readings,
