@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::OpenOptions;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Mutex;
@@ -10,28 +11,63 @@ use std::sync::Mutex;
 use anyhow::{Context, bail};
 use clap::Args;
 use quadrant_cli::output::progress;
+use quadrant_cli::say;
 use rayon::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+/// A campaign; its fields are its own options.
+pub trait Campaign: Args + Sync {
+    /// Result of a seed. A result may have parts: each of their fields is a column.
+    type Line: Serialize + DeserializeOwned + Send;
+    /// Its name: that of the file of results.
+    const NAME: &'static str;
+    /// Names of the line's columns, in the order of its fields.
+    const COLUMNS: &'static [&'static str];
+
+    /// Makes ready for the first seed.
+    ///
+    /// # Errors
+    /// Options that cannot be met.
+    fn prepare(&self) -> anyhow::Result<()> {
+        Ok(())
+    }
+
+    /// True if a seed is run at all.
+    fn requests(&self, _seed: u64) -> bool {
+        true
+    }
+
+    /// Runs a seed.
+    fn judge(&self, seed: u64) -> Self::Line;
+
+    /// Prints what the lines, at least one, come to.
+    ///
+    /// # Errors
+    /// Something that must hold and did not.
+    fn summarise(lines: &Lines<Self::Line>) -> anyhow::Result<()>;
+}
+
+/// Results by seed.
+pub type Lines<L> = BTreeMap<u64, L>;
+
 /// Options of a campaign.
 #[derive(Clone, Debug, Args)]
-pub struct Campaign {
+pub struct Arguments<C: Args> {
     /// First seed, and number of seeds.
     #[arg(long, default_value = "1+20", value_name = "FIRST+COUNT")]
     seeds: Seeds,
     /// Only every n-th seed, beginning with the i-th: a campaign on several machines.
     #[arg(long, default_value = "1/1", value_name = "I/N")]
     shard: Shard,
+    /// Results, a line a seed: those that are there already are not run again. The campaign's name and .csv, if it is left out.
+    #[arg(long, value_name = "FILE")]
+    results: Option<PathBuf>,
     /// Runs nothing: sums up these files of results.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     merge: Vec<PathBuf>,
-}
-
-/// A line of results.
-pub trait Seeded {
-    /// The seed that it is the result of.
-    fn seed(&self) -> u64;
+    #[command(flatten)]
+    campaign: C,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -76,86 +112,133 @@ impl FromStr for Shard {
     }
 }
 
-impl Campaign {
-    /// The results of the seeds for which `is_requested`: those that stand in the file of results, and those of the others, which are
-    /// `judge`d and appended to it.
+impl<C: Campaign> Arguments<C> {
+    /// Runs the campaign, or sums up what earlier ones have found.
     ///
     /// # Errors
-    /// A file that cannot be read or written, or no seed.
-    pub fn lines<L: Seeded + Serialize + DeserializeOwned + Send>(
-        &self,
-        results: &Path,
-        title: &'static str,
-        is_requested: impl Fn(u64) -> bool,
-        judge: impl Fn(u64) -> L + Sync,
-    ) -> anyhow::Result<BTreeMap<u64, L>> {
-        if !self.merge.is_empty() {
-            let mut lines = BTreeMap::new();
-            for path in &self.merge {
-                lines.extend(read(path)?);
-            }
-            return Ok(lines);
+    /// A file that cannot be read or written, or no seed; as [`Campaign::summarise`].
+    pub fn run(&self) -> anyhow::Result<()> {
+        let mut lines = Lines::new();
+        for path in &self.merge {
+            lines.extend(read::<C>(path)?);
         }
-        let mut lines = if results.exists() {
-            read(results)?
-        } else {
-            BTreeMap::new()
+        if self.merge.is_empty() {
+            lines = self.lines()?;
+        }
+        if lines.is_empty() {
+            bail!("no seed is left to run");
+        }
+        say!(
+            "Simulated, not measured: {} random {}\n",
+            lines.len(),
+            C::NAME
+        );
+        C::summarise(&lines)
+    }
+
+    /// The results of the requested seeds: those in the file of results, and those of the others, which are appended to it.
+    fn lines(&self) -> anyhow::Result<Lines<C::Line>> {
+        let results = match &self.results {
+            Some(path) => path.clone(),
+            None => PathBuf::from(format!("{}.csv", C::NAME)),
+        };
+        self.campaign.prepare()?;
+        let mut lines = match results.exists() {
+            true => read::<C>(&results)?,
+            false => Lines::new(),
         };
         let Seeds { first, count } = self.seeds;
-        let Shard {
-            index,
-            count: shards,
-        } = self.shard;
         let requested: Vec<u64> = (first..first + count)
-            .filter(|seed| (seed - first) % shards == index - 1)
-            .filter(|&seed| is_requested(seed))
+            .filter(|seed| (seed - first) % self.shard.count == self.shard.index - 1)
+            .filter(|&seed| self.campaign.requests(seed))
             .collect();
-        let missing: Vec<u64> = requested
-            .iter()
-            .copied()
-            .filter(|seed| !lines.contains_key(seed))
-            .collect();
-        let file = OpenOptions::new()
+        let is_missing = |seed: &u64| !lines.contains_key(seed);
+        let missing: Vec<u64> = requested.iter().copied().filter(is_missing).collect();
+        let mut file = OpenOptions::new()
             .create(true)
             .append(true)
-            .open(results)
+            .open(&results)
             .with_context(|| results.display().to_string())?;
+        if file.metadata()?.len() == 0 {
+            writeln!(file, "{}", header::<C>().join(","))?;
+        }
         let writer = csv::WriterBuilder::new()
-            .has_headers(lines.is_empty())
+            .has_headers(false)
             .from_writer(file);
         let writer = Mutex::new(writer);
-        let bar = progress(missing.len() as u64, title);
-        let found: Vec<anyhow::Result<L>> = missing
+        let bar = progress(missing.len() as u64, C::NAME);
+        let found: Vec<anyhow::Result<(u64, C::Line)>> = missing
             .par_iter()
             .map(|&seed| {
-                let line = judge(seed);
+                let line = self.campaign.judge(seed);
                 // A line at a time, so that nothing is lost when the campaign is interrupted.
                 let mut writer = writer.lock().unwrap_or_else(|broken| broken.into_inner());
-                writer.serialize(&line)?;
+                writer.serialize((seed, &line))?;
                 writer.flush()?;
                 bar.inc(1);
-                Ok(line)
+                Ok((seed, line))
             })
             .collect();
         bar.finish_and_clear();
         for line in found {
-            let line = line?;
-            lines.insert(line.seed(), line);
+            lines.extend([line?]);
         }
         lines.retain(|seed, _| requested.contains(seed));
-        if lines.is_empty() {
-            bail!("no seed is left to run");
-        }
         Ok(lines)
     }
 }
 
-fn read<L: Seeded + DeserializeOwned>(path: &Path) -> anyhow::Result<BTreeMap<u64, L>> {
+fn header<C: Campaign>() -> Vec<&'static str> {
+    [&["seed"], C::COLUMNS].concat()
+}
+
+fn read<C: Campaign>(path: &Path) -> anyhow::Result<Lines<C::Line>> {
     let at = || path.display().to_string();
     let mut reader = csv::Reader::from_path(path).with_context(at)?;
+    if reader.headers().with_context(at)? != header::<C>() {
+        bail!(
+            "{} has other columns than {}: it is of another campaign, or of another version of this program",
+            path.display(),
+            header::<C>().join(",")
+        );
+    }
     reader
-        .deserialize()
-        .map(|line| line.map(|line: L| (line.seed(), line)))
+        .records()
+        .map(|record| record?.deserialize(None))
         .collect::<Result<_, _>>()
         .with_context(at)
+}
+
+/// Largest number of seeds that are listed one by one.
+pub const LISTED: usize = 10;
+
+/// Lists the worst seeds below a title, by `badness`; lines that have none are left out.
+pub fn list_worst<L>(
+    title: &str,
+    lines: &Lines<L>,
+    badness: impl Fn(&L) -> Option<f64>,
+    describe: impl Fn(&L) -> String,
+) {
+    let mut worst: Vec<(f64, u64, &L)> = lines
+        .iter()
+        .filter_map(|(seed, line)| Some((badness(line)?, *seed, line)))
+        .collect();
+    worst.sort_by(|a, b| b.0.total_cmp(&a.0));
+    if worst.is_empty() {
+        return;
+    }
+    say!("\n{title}, to be replayed with --seeds SEED+1 --results FILE:");
+    for (_, seed, line) in worst.iter().take(LISTED) {
+        say!("{seed:>8}  {}", describe(line));
+    }
+}
+
+/// Makes the folder of an option, if it is given.
+///
+/// # Errors
+/// A folder that cannot be made.
+pub fn make_folder(folder: Option<&Path>) -> anyhow::Result<()> {
+    folder.map_or(Ok(()), |folder| {
+        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())
+    })
 }

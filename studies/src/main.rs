@@ -3,12 +3,19 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 use quadrant_cli::{explained, terminal, warn};
-use quadrant_studies::{
-    cuts, friction_models, identification, laws, learning, numerics, outputs, random_axes,
-    random_faults, report, robustness,
-};
+use quadrant_studies::cuts::Cuts;
+use quadrant_studies::identification::Identification;
+use quadrant_studies::learning::Learning;
+use quadrant_studies::numerics::NumberTypes;
+use quadrant_studies::outputs::Outputs;
+use quadrant_studies::random_axes::{Axes, cases};
+use quadrant_studies::random_faults::Faults;
+use quadrant_studies::robustness::Robustness;
+use quadrant_studies::thesis::Report;
+use quadrant_studies::wrong_model::WrongModel;
+use quadrant_studies::{campaign, study};
 
 /// The thesis' tables and figures, and the comparative studies, on the simulated stage.
 #[derive(Debug, Parser)]
@@ -22,45 +29,54 @@ struct Arguments {
 enum Command {
     /// Commission random axes that are not the simulated stage's, and judge the settings on motions that the commissioning did
     /// not see.
-    Axes(random_axes::command::Arguments),
+    Axes(AxesArguments),
     /// Run learning under random cuts while friction changes, and compare it with no feedforward, 2 s by 2 s.
-    Cuts(cuts::command::Arguments),
+    Cuts(campaign::Arguments<Cuts>),
     /// Run the firmware's tasks through random faults at random activities, and check what must hold in every
     /// case.
-    Faults(random_faults::command::Arguments),
-    /// Compare the friction models on the same motions: loops, memory, drift, lag.
-    Friction(friction_models::command::Arguments),
+    Faults(campaign::Arguments<Faults>),
     /// Compare identification with the plant's parameters, which it does not know: errors, and whether the stated
     /// uncertainties hold.
-    Identification(identification::command::Arguments),
-    /// Compare all feedback laws, tuned with equal effort at equal robustness, and feedforward whose model is wrong.
-    Laws(laws::command::Arguments),
-    /// Run the feedforward that learns from other starts, on part programs, after changes of the axis.
-    Learning(learning::command::Arguments),
+    Identification(study::Arguments<Identification>),
+    /// Run the feedforward that learns from other starts, after a step of friction, and in a cut that is cancelled.
+    Learning(study::Arguments<Learning>),
     /// Compare f32 and fixed point with f64 over the whole comparison.
-    Numerics(numerics::command::Arguments),
+    Numerics(study::Arguments<NumberTypes>),
     /// Compare amplifier outputs of 16 bits with 12 bits, plain and with the error shaped.
-    Outputs(outputs::command::Arguments),
-    /// Make every table and figure of the thesis' chapters 3 to 5 and the studies in one page: under five minutes on two
-    /// cores. An interrupted report goes on where it stopped.
-    Report(report::command::Arguments),
-    /// Run the laws with a changed mass, friction, delay, amplifier, encoder or drive, and while a tool cuts.
-    Robustness(robustness::command::Arguments),
+    Outputs(study::Arguments<Outputs>),
+    /// Make every table and figure of the thesis' chapters 3 to 5 in one page: under five minutes on two cores.
+    Report(study::Arguments<Report>),
+    /// Run the laws with a changed mass, friction, delay, amplifier or encoder, and while a tool cuts.
+    Robustness(study::Arguments<Robustness>),
+    /// Run feedforward whose model is wrong behind the best PID.
+    WrongModel(study::Arguments<WrongModel>),
+}
+
+#[derive(Debug, Args)]
+struct AxesArguments {
+    /// Named axes instead, each with one thing that a commissioning may stumble over: a table of them, in Markdown.
+    #[arg(long, conflicts_with_all = ["seeds", "shard", "merge", "rigid", "pages"])]
+    cases: bool,
+    #[command(flatten)]
+    random: campaign::Arguments<Axes>,
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
-        Command::Axes(arguments) => random_axes::command::run(&arguments),
-        Command::Cuts(arguments) => cuts::command::run(&arguments),
-        Command::Faults(arguments) => random_faults::command::run(&arguments),
-        Command::Friction(arguments) => friction_models::command::run(&arguments),
-        Command::Identification(arguments) => identification::command::run(&arguments),
-        Command::Laws(arguments) => laws::command::run(&arguments),
-        Command::Learning(arguments) => learning::command::run(&arguments),
-        Command::Numerics(arguments) => numerics::command::run(&arguments),
-        Command::Outputs(arguments) => outputs::command::run(&arguments),
-        Command::Report(arguments) => report::command::run(&arguments),
-        Command::Robustness(arguments) => robustness::command::run(&arguments),
+        Command::Axes(AxesArguments { cases: true, .. }) => {
+            cases::print_table();
+            Ok(())
+        }
+        Command::Axes(AxesArguments { random, .. }) => random.run(),
+        Command::Cuts(arguments) => arguments.run(),
+        Command::Faults(arguments) => arguments.run(),
+        Command::Identification(arguments) => arguments.run(),
+        Command::Learning(arguments) => arguments.run(),
+        Command::Numerics(arguments) => arguments.run(),
+        Command::Outputs(arguments) => arguments.run(),
+        Command::Report(arguments) => arguments.run(),
+        Command::Robustness(arguments) => arguments.run(),
+        Command::WrongModel(arguments) => arguments.run(),
     };
     match done.and_then(|()| terminal::finish()) {
         Ok(()) => ExitCode::SUCCESS,

@@ -6,15 +6,14 @@
 //! run without. Windows are *settled* while nothing has changed since the last reversal but one: what comes before the next reversal
 //! cannot be learnt, because only a reversal shows it.
 
-pub mod command;
+mod summary;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use clap::Args;
 use quadrant_cli::warn;
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::feedback::LawKind;
-use quadrant_law::feedforward::FeedforwardKind;
-use quadrant_law::learning::LearningSettings;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::SafetyState;
 use quadrant_settings::Job;
@@ -26,10 +25,62 @@ use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::Load;
 use quadrant_sim::plant::{AxisParameters, NEWTONS_PER_VOLT, SimulatedAxis, StageParameters};
-use quadrant_sim::report::whole;
+use quadrant_sim::record::{TraceError, write_trace};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
+
+use crate::campaign::{Campaign, Lines, make_folder};
+use crate::competitor::Feedforward;
+
+/// `quadrant-studies cuts`.
+#[derive(Clone, Debug, Args)]
+pub struct Cuts {
+    /// Folder for a trace of each seed: errors, scale, gate and voltages over time, as CSV.
+    #[arg(long, value_name = "FOLDER")]
+    traces: Option<PathBuf>,
+}
+
+impl Campaign for Cuts {
+    type Line = Line;
+    const NAME: &'static str = "cuts";
+    const COLUMNS: &'static [&'static str] = &[
+        "settled_percent",
+        "off_um",
+        "fixed_worst_ratio",
+        "fixed_worst_at_s",
+        "fixed_worse_percent",
+        "fixed_settled_worst_ratio",
+        "fixed_settled_worse_percent",
+        "fixed_um",
+        "learning_worst_ratio",
+        "learning_worst_at_s",
+        "learning_worse_percent",
+        "learning_settled_worst_ratio",
+        "learning_settled_worse_percent",
+        "learning_um",
+        "cancelling_worst_ratio",
+        "cancelling_worst_at_s",
+        "cancelling_worse_percent",
+        "cancelling_settled_worst_ratio",
+        "cancelling_settled_worse_percent",
+        "cancelling_um",
+        "case",
+    ];
+
+    fn prepare(&self) -> anyhow::Result<()> {
+        make_folder(self.traces.as_deref())
+    }
+
+    fn judge(&self, seed: u64) -> Line {
+        judge(seed, self.traces.as_deref())
+    }
+
+    fn summarise(lines: &Lines<Line>) -> anyhow::Result<()> {
+        summary::print(lines);
+        Ok(())
+    }
+}
 
 /// Length of a run, s.
 const RUN_S: f64 = 45.0;
@@ -42,7 +93,7 @@ const STRIDE_S: f64 = 0.1;
 /// Excess of an error that is none, RMS, um: a count of the encoder.
 const FLOOR_UM: f64 = 0.5;
 /// Ratio of RMS errors beyond which a window is worse.
-pub const WORSE: f64 = 1.005;
+const WORSE: f64 = 1.005;
 /// Time from one line of a trace to the next, s.
 const MOMENT_S: f64 = 1e-3;
 /// Lead-in of the sine, s.
@@ -52,37 +103,34 @@ const SAME_FRICTION: f64 = 1.05;
 /// Time from one change of a drifting friction to the next, s.
 const DRIFT_S: f64 = 0.01;
 
-/// One line of a campaign's results.
+/// Result of a seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Line {
-    pub seed: u64,
-    /// Largest RMS error of a window over that without feedforward, of learning; and when the window begins, s.
+    /// Share of the windows that are settled, %.
+    pub settled_percent: f64,
+    /// RMS error of all that is compared without feedforward, um.
+    pub off_um: f64,
+    pub fixed: Comparison,
+    pub learning: Comparison,
+    /// Learning and cancelling.
+    pub cancelling: Comparison,
+    /// The case, for a person.
+    pub case: String,
+}
+
+/// Errors of a feedforward beside those without.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// Largest RMS error of a window over that without feedforward, and when the window begins, s.
     pub worst_ratio: f64,
     pub worst_at_s: f64,
     /// Share of the windows that are worse, %.
     pub worse_percent: f64,
-    /// Share of the windows that are settled, %; and of these the largest ratio, of learning, and the share that is worse, %.
-    pub settled_percent: f64,
+    /// The same of the windows that are settled.
     pub settled_worst_ratio: f64,
     pub settled_worse_percent: f64,
-    /// The same of the feedforward as commissioned.
-    pub fixed_worst_ratio: f64,
-    pub fixed_worse_percent: f64,
-    pub fixed_settled_worst_ratio: f64,
-    pub fixed_settled_worse_percent: f64,
-    /// The same of learning and cancelling.
-    pub cancelling_worst_ratio: f64,
-    pub cancelling_worst_at_s: f64,
-    pub cancelling_worse_percent: f64,
-    pub cancelling_settled_worst_ratio: f64,
-    pub cancelling_settled_worse_percent: f64,
-    /// RMS errors of all that is compared, um: without, as commissioned, learning, learning and cancelling.
-    pub off_um: f64,
-    pub fixed_um: f64,
-    pub learning_um: f64,
-    pub cancelling_um: f64,
-    /// The case, for a person.
-    pub case: String,
+    /// RMS error of all that is compared, um.
+    pub rms_um: f64,
 }
 
 /// A run of a case.
@@ -90,39 +138,12 @@ pub struct Line {
 struct Run {
     /// The true error over time, um.
     errors: Vec<f64>,
-    /// What a person may want to see beside it, every [`MOMENT_S`].
-    moments: Vec<Moment>,
+    /// What a person may want to see beside it, every [`MOMENT_S`]: the [`MOMENT`]'s values.
+    moments: [Vec<f64>; 5],
 }
 
-/// The state of the axis at a moment of a run.
-#[derive(Clone, Copy, Debug)]
-struct Moment {
-    reference_mm: f64,
-    load_v: f64,
-    scale: f32,
-    gate: f32,
-    cancelling_v: f32,
-}
-
-/// A line of a trace: one moment of the four runs of a case.
-#[derive(Clone, Debug, Serialize)]
-struct TraceLine {
-    time_s: f64,
-    reference_mm: f64,
-    /// Friction over the nominal's.
-    friction: f64,
-    /// The tool's force, V.
-    load_v: f64,
-    off_um: f64,
-    fixed_um: f64,
-    learning_um: f64,
-    learning_scale: f32,
-    learning_gate: f32,
-    cancelling_um: f64,
-    cancelling_scale: f32,
-    cancelling_gate: f32,
-    cancelling_v: f32,
-}
+/// Values of a moment of a run.
+const MOMENT: [&str; 5] = ["reference_mm", "load_v", "scale", "gate", "cancelling_v"];
 
 /// A case drawn from a seed.
 struct Case {
@@ -217,16 +238,14 @@ impl Case {
     fn run(
         &self,
         stage: &StageSettings,
-        kind: FeedforwardKind,
-        learning: Option<LearningSettings>,
+        feedforward: Feedforward,
         cancels: bool,
         seed: u64,
     ) -> Option<Run> {
         let mut stage = stage.clone();
         let mut axis = stage.axes[0].clone();
         axis.feedback.law = self.law;
-        axis.feedforward.kind = kind;
-        axis.feedforward.learning = learning;
+        feedforward.apply(&mut axis);
         axis.feedforward.cancelling = cancels.then(|| CancellingSettings {
             spindle_rpm: self.cut.spindle_rpm,
             teeth: self.cut.teeth as u8,
@@ -258,7 +277,7 @@ impl Case {
         let mut plant = SimulatedAxis::new(with_friction(0.0), rate_hz, seed);
         let mut operator = Operator::runs_the_plan();
         let mut errors = Vec::new();
-        let mut moments = Vec::new();
+        let mut moments: [Vec<f64>; 5] = Default::default();
         let moment = (MOMENT_S * rate_hz) as usize;
         let drift = (DRIFT_S * rate_hz) as usize;
         let mut factor = self.friction_at(0.0);
@@ -283,13 +302,17 @@ impl Case {
                 let axis = &state.axes()[0];
                 let reference_mm = axis.telemetry().reference.to_mm(resolution_mm);
                 if errors.len().is_multiple_of(moment) {
-                    moments.push(Moment {
-                        reference_mm,
-                        load_v,
-                        scale: axis.learning().scale(),
-                        gate: axis.learning().gate(),
-                        cancelling_v: axis.cancelling().voltage(),
-                    });
+                    let learning = axis.learning();
+                    let voltages = [
+                        learning.scale(),
+                        learning.gate(),
+                        axis.cancelling().voltage(),
+                    ];
+                    let [scale, gate, cancelling_v] = voltages.map(f64::from);
+                    let values = [reference_mm, load_v, scale, gate, cancelling_v];
+                    for (moments, value) in moments.iter_mut().zip(values) {
+                        moments.push(value);
+                    }
                 }
                 errors.push(1e3 * (reference_mm - plant.position_mm()));
             } else if !errors.is_empty() {
@@ -300,34 +323,30 @@ impl Case {
         Some(Run { errors, moments })
     }
 
-    /// Writes the four runs side by side, a line every millisecond, as CSV.
-    fn write_trace(&self, path: &Path, runs: [&Run; 4]) -> csv::Result<()> {
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        let stride = (runs[0].errors.len() as f64 / RUN_S * MOMENT_S).round() as usize;
-        let [off, fixed, learning, cancelling] = runs;
-        for (index, (learns, cancels)) in
-            learning.moments.iter().zip(&cancelling.moments).enumerate()
-        {
-            let time_s = MOMENT_S * index as f64;
-            let error_um = |run: &Run| run.errors.get(index * stride).copied().unwrap_or(f64::NAN);
-            writer.serialize(TraceLine {
-                time_s,
-                reference_mm: learns.reference_mm,
-                friction: self.friction_at(time_s),
-                load_v: learns.load_v,
-                off_um: error_um(off),
-                fixed_um: error_um(fixed),
-                learning_um: error_um(learning),
-                learning_scale: learns.scale,
-                learning_gate: learns.gate,
-                cancelling_um: error_um(cancelling),
-                cancelling_scale: cancels.scale,
-                cancelling_gate: cancels.gate,
-                cancelling_v: cancels.cancelling_v,
-            })?;
+    /// Writes the runs side by side, a line every millisecond, as CSV.
+    fn write_trace(&self, path: &Path, runs: &[(&str, Run)]) -> Result<(), TraceError> {
+        let whole = runs.iter().filter(|(_, run)| !run.errors.is_empty());
+        let lines = whole.clone().map(|(_, run)| run.moments[0].len()).min();
+        let times: Vec<f64> = (0..lines.unwrap_or(0))
+            .map(|index| MOMENT_S * index as f64)
+            .collect();
+        let frictions = times.iter().map(|time_s| self.friction_at(*time_s));
+        let mut columns = vec![("friction".to_owned(), frictions.collect::<Vec<f64>>())];
+        for (name, run) in whole {
+            let stride = run.errors.len().div_ceil(run.moments[0].len());
+            let errors = run.errors.iter().step_by(stride).copied();
+            columns.push((format!("{name}_um"), errors.take(times.len()).collect()));
+            for (value, moments) in MOMENT.iter().zip(&run.moments) {
+                columns.push((format!("{name}_{value}"), moments[..times.len()].to_vec()));
+            }
         }
-        let text = writer.into_inner().map_err(|error| error.into_error())?;
-        Ok(whole::write(path, text)?)
+        let mut all: Vec<(&str, &[f64])> = vec![("time_s", &times)];
+        all.extend(
+            columns
+                .iter()
+                .map(|(name, values)| (name.as_str(), values.as_slice())),
+        );
+        write_trace(path, &all)
     }
 
     fn describe(&self) -> String {
@@ -375,57 +394,51 @@ fn begins_s(window: usize) -> f64 {
     FIRST_S + STRIDE_S * window as f64
 }
 
-/// Errors of a law beside those without feedforward.
-#[derive(Clone, Copy, Debug)]
-struct Comparison {
-    /// Largest ratio of the windows, and the number of its window.
-    worst: f64,
-    at: usize,
-    /// Share of the windows that are worse, %.
-    worse_percent: f64,
-    /// The same of the windows that are settled.
-    settled_worst: f64,
-    settled_worse_percent: f64,
-}
-
 impl Comparison {
     /// Compares window by window. A run that a fault ended is worse in all of them.
-    fn new(with: &[f64], without: &[f64], settled: &[bool]) -> Self {
+    fn new(run: &Run, without: &[f64], settled: &[bool]) -> Self {
+        let with = windows(run);
+        let rms_um = whole_um(run);
         if with.is_empty() {
             return Self {
-                worst: f64::INFINITY,
-                at: 0,
+                worst_ratio: f64::INFINITY,
+                worst_at_s: begins_s(0),
                 worse_percent: 100.0,
-                settled_worst: f64::INFINITY,
+                settled_worst_ratio: f64::INFINITY,
                 settled_worse_percent: 100.0,
+                rms_um,
             };
         }
-        let ratios = || {
-            let errors = with.iter().zip(without);
-            errors.map(|(with, without)| (with - FLOOR_UM) / without)
+        let errors = with.iter().zip(without);
+        let ratios: Vec<f64> = errors
+            .map(|(with, without)| (with - FLOOR_UM) / without)
+            .collect();
+        let settled: Vec<f64> = ratios
+            .iter()
+            .zip(settled)
+            .filter_map(|(ratio, settled)| settled.then_some(*ratio))
+            .collect();
+        let worse_percent = |ratios: &[f64]| {
+            let worse = ratios.iter().filter(|ratio| **ratio > WORSE).count();
+            100.0 * worse as f64 / ratios.len().max(1) as f64
         };
-        let settled = || {
-            let ratios = ratios().zip(settled);
-            ratios.filter_map(|(ratio, settled)| settled.then_some(ratio))
-        };
-        let worse_percent = |ratios: &mut dyn Iterator<Item = f64>| {
-            let (mut worse, mut all) = (0, 0);
-            for ratio in ratios {
-                worse += usize::from(ratio > WORSE);
-                all += 1;
-            }
-            100.0 * f64::from(worse as u32) / f64::from(all.max(1))
-        };
-        let largest = ratios().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
-        let (at, worst) = largest.unwrap_or((0, f64::NAN));
+        let largest = ratios.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+        let (at, worst_ratio) = largest.unwrap_or((0, &f64::NAN));
         Self {
-            worst,
-            at,
-            worse_percent: worse_percent(&mut ratios()),
-            settled_worst: settled().fold(0.0, f64::max),
-            settled_worse_percent: worse_percent(&mut settled()),
+            worst_ratio: *worst_ratio,
+            worst_at_s: begins_s(at),
+            worse_percent: worse_percent(&ratios),
+            settled_worst_ratio: settled.iter().copied().fold(0.0, f64::max),
+            settled_worse_percent: worse_percent(&settled),
+            rms_um,
         }
     }
+}
+
+/// RMS error of all that is compared, um.
+fn whole_um(run: &Run) -> f64 {
+    let first = (FIRST_S / RUN_S * run.errors.len() as f64) as usize;
+    rms(&run.errors[first..])
 }
 
 /// Runs the case of a seed and compares; leaves the trace of its runs in a folder.
@@ -437,57 +450,36 @@ pub fn judge(seed: u64, traces: Option<&Path>) -> Line {
     let stage = identified_settings()
         .expect("the settings of the repository")
         .stage;
-    let learning = Some(LearningSettings::default());
-    let [off, fixed, learning, cancelling] = [
-        (FeedforwardKind::None, None, false),
-        (FeedforwardKind::Combined, None, false),
-        (FeedforwardKind::Combined, learning, false),
-        (FeedforwardKind::Combined, learning, true),
+    let runs = [
+        ("off", Feedforward::Without, false),
+        ("fixed", Feedforward::Fixed, false),
+        ("learning", Feedforward::Learning, false),
+        ("cancelling", Feedforward::Learning, true),
     ]
-    .map(|(kind, learning, cancels)| {
-        case.run(&stage, kind, learning, cancels, seed)
-            .unwrap_or_default()
+    .map(|(name, feedforward, cancels)| {
+        let run = case.run(&stage, feedforward, cancels, seed);
+        (name, run.unwrap_or_default())
     });
-    let [of_off, of_fixed, of_learning, of_cancelling] =
-        [&off, &fixed, &learning, &cancelling].map(windows);
-    let settled: Vec<bool> = (0..of_off.len())
+    let [(_, off), (_, fixed), (_, learning), (_, cancelling)] = &runs;
+    let without = windows(off);
+    let settled: Vec<bool> = (0..without.len())
         .map(|window| case.is_settled(begins_s(window)))
         .collect();
-    let settled_count = settled.iter().filter(|settled| **settled).count();
-    let [learns, commissioned, cancels] = [&of_learning, &of_fixed, &of_cancelling]
-        .map(|of_law| Comparison::new(of_law, &of_off, &settled));
-    let whole = |run: &Run| {
-        let first = (FIRST_S / RUN_S * run.errors.len() as f64) as usize;
-        rms(&run.errors[first..])
-    };
     if let Some(folder) = traces {
         let path = folder.join(format!("{seed}.csv"));
         // The result is worth more than its trace.
-        if let Err(error) = case.write_trace(&path, [&off, &fixed, &learning, &cancelling]) {
+        if let Err(error) = case.write_trace(&path, &runs) {
             warn!("{}: {error}", path.display());
         }
     }
+    let compared = |run: &Run| Comparison::new(run, &without, &settled);
+    let settled_count = settled.iter().filter(|settled| **settled).count();
     Line {
-        seed,
-        worst_ratio: learns.worst,
-        worst_at_s: begins_s(learns.at),
-        worse_percent: learns.worse_percent,
         settled_percent: 100.0 * settled_count as f64 / settled.len() as f64,
-        settled_worst_ratio: learns.settled_worst,
-        settled_worse_percent: learns.settled_worse_percent,
-        fixed_worst_ratio: commissioned.worst,
-        fixed_worse_percent: commissioned.worse_percent,
-        fixed_settled_worst_ratio: commissioned.settled_worst,
-        fixed_settled_worse_percent: commissioned.settled_worse_percent,
-        cancelling_worst_ratio: cancels.worst,
-        cancelling_worst_at_s: begins_s(cancels.at),
-        cancelling_worse_percent: cancels.worse_percent,
-        cancelling_settled_worst_ratio: cancels.settled_worst,
-        cancelling_settled_worse_percent: cancels.settled_worse_percent,
-        off_um: whole(&off),
-        fixed_um: whole(&fixed),
-        learning_um: whole(&learning),
-        cancelling_um: whole(&cancelling),
+        off_um: whole_um(off),
+        fixed: compared(fixed),
+        learning: compared(learning),
+        cancelling: compared(cancelling),
         case: case.describe(),
     }
 }

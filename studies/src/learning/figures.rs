@@ -1,13 +1,12 @@
 //! The study's figures: the scale settling after a step of friction, and a slot with and without.
 
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::plant::NEWTONS_PER_VOLT;
-use quadrant_sim::plant::cutting::{Component, Milling};
-use quadrant_sim::plant::load::Load;
-use quadrant_sim::report::{Figure, Lines, Plot, Series, Style, decimate};
+use quadrant_sim::pages::{lines, series};
+use quadrant_sim::plant::cutting::Milling;
+use quadrant_sim::report::{Figure, Series, Style, decimate};
 
-use super::run::{Friction, Nothing, Phase, SINE, Trace, cycle_s, run};
-use super::starts::nominal;
+use super::run::{Phase, SINE, Trace, cycle_s, nominal, run, slot, under_pid};
+use crate::competitor::Feedforward;
 
 /// Cycles before the step of friction.
 const BEFORE: f64 = 0.75;
@@ -28,25 +27,12 @@ fn curve(name: &str, values: &[f64], period_s: f64, style: usize) -> Series {
     let time: Vec<f64> = (0..values.len()).map(|k| k as f64 * period_s).collect();
     let kept = decimate(&time, values, POINTS);
     let rounded = |value: f64| (1e4 * value).round() / 1e4;
-    Series {
-        name: name.to_owned(),
-        x: kept.iter().map(|&k| rounded(time[k])).collect(),
-        y: kept.iter().map(|&k| rounded(values[k])).collect(),
-        style: Style::nth(style),
-    }
-}
-
-fn figure(id: &str, caption: &str, y_label: &str, series: Vec<Series>) -> Figure {
-    Figure {
-        id: id.to_owned(),
-        caption: caption.to_owned(),
-        plot: Plot::Lines(Lines {
-            x_label: "time (s)".to_owned(),
-            y_label: y_label.to_owned(),
-            series,
-            ..Lines::default()
-        }),
-    }
+    series(
+        name,
+        kept.iter().map(|&k| rounded(time[k])).collect(),
+        kept.iter().map(|&k| rounded(values[k])).collect(),
+        Style::nth(style),
+    )
 }
 
 /// The figures, each run with its phases under the axis' PID.
@@ -57,12 +43,12 @@ pub(super) fn figures(
     stage: &StageSettings,
     axis: &AxisSettings,
     seed: u64,
-) -> anyhow::Result<Vec<Figure>> {
+) -> anyhow::Result<[Figure; 3]> {
     let period_s = 1.0 / stage.rate_hz;
-    let traces = |friction: Friction, phases: &[Phase]| -> anyhow::Result<Trace> {
-        let axis = friction.of(axis);
+    let traces = |feedforward: Feedforward, phases: &[Phase]| -> anyhow::Result<Trace> {
+        let axis = under_pid(axis, feedforward);
         let mut whole = Trace::default();
-        for part in run(stage, &axis, phases, &mut Nothing, seed)? {
+        for part in run(stage, &axis, phases, seed)? {
             whole.error_um.extend(part.error_um);
             whole.scale.extend(part.scale);
         }
@@ -72,8 +58,8 @@ pub(super) fn figures(
         Phase::sine(SINE, BEFORE, nominal()),
         Phase::sine(SINE, AFTER, nominal().with_friction(STEPPED)),
     ];
-    let learning = traces(Friction::Learning, &step)?;
-    let fixed = traces(Friction::Fixed, &step)?;
+    let learning = traces(Feedforward::Learning, &step)?;
+    let fixed = traces(Feedforward::Fixed, &step)?;
     let stepped_s = BEFORE * cycle_s(SINE);
     let scale: Vec<f64> = learning.scale.iter().copied().map(f64::from).collect();
     let true_scale: Vec<f64> = (0..scale.len())
@@ -85,46 +71,41 @@ pub(super) fn figures(
             }
         })
         .collect();
-    let slot = [Phase::sine(SINE, SLOT, nominal()).loaded(Load::Milling {
-        cut: Milling::slot(),
-        component: Component::Normal,
-        engaged_s: (0.0, 1e3),
-        newtons_per_volt: NEWTONS_PER_VOLT,
-    })];
-    let last = |friction: Friction| -> anyhow::Result<Vec<f64>> {
-        let trace = traces(friction, &slot)?;
+    let slot = [Phase::sine(SINE, SLOT, nominal()).loaded(slot(Milling::slot()))];
+    let last = |feedforward: Feedforward| -> anyhow::Result<Vec<f64>> {
+        let trace = traces(feedforward, &slot)?;
         let samples = |seconds: f64| (seconds * stage.rate_hz) as usize;
         let first = trace.error_um.len().saturating_sub(samples(SHOWN_S.0));
         let shown = trace.error_um[first..].iter().take(samples(SHOWN_S.1));
         Ok(shown.copied().collect())
     };
-    Ok(vec![
-        figure(
+    Ok([
+        lines(
             "settling-scale",
             "Simulated. The scale after a step of all friction to 1.5 times, a sine of 30 mm at 10 mm/s",
-            "scale",
+            ("time (s)", "scale"),
             vec![
                 curve("friction", &true_scale, period_s, 0),
                 curve("scale learnt", &scale, period_s, 1),
             ],
         ),
-        figure(
+        lines(
             "settling-error",
             "Simulated. The error meanwhile",
-            "error (um)",
+            ("time (s)", "error (um)"),
             vec![
                 curve("fixed", &fixed.error_um, period_s, 0),
                 curve("learning", &learning.error_um, period_s, 1),
             ],
         ),
-        figure(
+        lines(
             "slot",
             "Simulated. A reversal of the same sine while a slot is milled, teeth at 100 Hz",
-            "error (um)",
+            ("time (s)", "error (um)"),
             vec![
-                curve("fixed", &last(Friction::Fixed)?, period_s, 0),
-                curve("without", &last(Friction::Without)?, period_s, 2),
-                curve("learning", &last(Friction::Learning)?, period_s, 1),
+                curve("fixed", &last(Feedforward::Fixed)?, period_s, 0),
+                curve("without", &last(Feedforward::Without)?, period_s, 2),
+                curve("learning", &last(Feedforward::Learning)?, period_s, 1),
             ],
         ),
     ])

@@ -1,67 +1,50 @@
 //! A run of one axis: motions one after the other, on an axis that changes between them, while a tool may cut.
 
 use quadrant_law::axes::AxisName;
-use quadrant_law::axis::telemetry::AxisTelemetry;
 use quadrant_law::cancelling::SpindleSpeed;
 use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
-use quadrant_law::feedforward::FeedforwardKind;
-use quadrant_law::learning::LearningSettings;
-use quadrant_law::reference::{HarmonicSettings, Motion, MotionSettings, RecordedTable};
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::SafetyState;
-use quadrant_law::units::DacCode;
 use quadrant_settings::Job;
 use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_sim::experiment::configuration::ELEMENTS;
 use quadrant_sim::machine::LawMachine;
 use quadrant_sim::machine::law::TickInput;
+use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::Load;
-use quadrant_sim::plant::{AxisParameters, SimulatedAxis};
+use quadrant_sim::plant::{AxisParameters, NEWTONS_PER_VOLT, SimulatedAxis, StageParameters};
 
-/// The feedforward of a competitor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Friction {
-    /// None: the feedback alone.
-    Without,
-    /// As the settings have it.
-    Fixed,
-    /// The same, learning.
-    Learning,
+use crate::competitor::Feedforward;
+
+/// The x axis of the simulated stage.
+pub(super) fn nominal() -> AxisParameters {
+    let [x, ..] = StageParameters::real().axes;
+    x
 }
 
-impl Friction {
-    pub(super) const ALL: [Self; 3] = [Self::Without, Self::Fixed, Self::Learning];
+/// The settings of an axis with a feedforward, under a PID.
+pub(super) fn under_pid(axis: &AxisSettings, feedforward: Feedforward) -> AxisSettings {
+    let mut axis = axis.clone();
+    axis.feedback.law = LawKind::Pid;
+    feedforward.apply(&mut axis);
+    axis
+}
 
-    /// The settings of an axis with it, under a PID.
-    pub(super) fn of(self, axis: &AxisSettings) -> AxisSettings {
-        let mut axis = axis.clone();
-        axis.feedback.law = LawKind::Pid;
-        axis.feedforward.kind = match self {
-            Self::Without => FeedforwardKind::None,
-            Self::Fixed | Self::Learning => FeedforwardKind::Combined,
-        };
-        axis.feedforward.learning = match self {
-            Self::Learning => Some(LearningSettings::default()),
-            Self::Without | Self::Fixed => None,
-        };
-        axis
+/// A cut all along, whose force across the feed acts on the axis.
+pub(super) fn slot(cut: Milling) -> Load {
+    Load::Milling {
+        cut,
+        component: Component::Normal,
+        engaged_s: (0.0, 1e3),
+        newtons_per_volt: NEWTONS_PER_VOLT,
     }
-}
-
-/// The motion of a phase.
-#[derive(Clone, Debug)]
-pub(super) enum PhaseMotion {
-    Planned(MotionSettings),
-    /// Along recorded positions.
-    Recorded(RecordedTable<f32>),
 }
 
 /// A part of a run.
 #[derive(Clone, Debug)]
 pub(super) struct Phase {
-    /// Its motion; a hold lasts for `rest_s`.
-    pub(super) motion: PhaseMotion,
-    pub(super) rest_s: f64,
+    pub(super) motion: MotionSettings,
     /// The axis as it then is, and what pushes it, from the beginning of the phase on.
     pub(super) truth: AxisParameters,
     pub(super) load: Load,
@@ -86,28 +69,10 @@ impl Phase {
     pub(super) fn sine(sine: (f64, f64), cycles: f64, truth: AxisParameters) -> Self {
         let harmonic = HarmonicSettings::with_velocity(sine.0, sine.1, cycles, LEAD_S);
         Self {
-            motion: PhaseMotion::Planned(MotionSettings::Harmonic(harmonic)),
-            rest_s: 0.0,
+            motion: MotionSettings::Harmonic(harmonic),
             truth,
             load: Load::None,
             spindle_rpm: None,
-        }
-    }
-
-    pub(super) fn rest(seconds: f64, truth: AxisParameters) -> Self {
-        Self {
-            motion: PhaseMotion::Planned(MotionSettings::Hold),
-            rest_s: seconds,
-            truth,
-            load: Load::None,
-            spindle_rpm: None,
-        }
-    }
-
-    pub(super) fn recorded(table: RecordedTable<f32>, truth: AxisParameters) -> Self {
-        Self {
-            motion: PhaseMotion::Recorded(table),
-            ..Self::rest(0.0, truth)
         }
     }
 
@@ -150,21 +115,6 @@ impl Trace {
     }
 }
 
-/// Something beside the law that adds to its output.
-pub(super) trait Addition {
-    /// The voltage to add to the output of a tick, V.
-    fn step(&mut self, seen: &AxisTelemetry<f32>) -> f64;
-}
-
-/// No addition.
-pub(super) struct Nothing;
-
-impl Addition for Nothing {
-    fn step(&mut self, _: &AxisTelemetry<f32>) -> f64 {
-        0.0
-    }
-}
-
 /// Runs the phases on an axis with these settings; a trace of each.
 ///
 /// # Errors
@@ -173,7 +123,6 @@ pub(super) fn run(
     stage: &StageSettings,
     axis: &AxisSettings,
     phases: &[Phase],
-    addition: &mut dyn Addition,
     seed: u64,
 ) -> anyhow::Result<Vec<Trace>> {
     let stage = StageSettings {
@@ -191,30 +140,22 @@ pub(super) fn run(
         return Ok(Vec::new());
     };
     let mut plant = SimulatedAxis::new(first.truth.clone(), rate_hz, seed);
-    let code_per_v = DacCode::FULL_SCALE / axis.amplifier.full_scale_v;
     let mut requests = vec![Command::Enable];
     let mut traces = Vec::new();
     for phase in phases {
         plant.change(phase.truth.clone());
         let mut trace = Trace::default();
-        let motion = match &phase.motion {
-            PhaseMotion::Planned(motion) => {
-                let motions = [*motion, MotionSettings::Hold, MotionSettings::Hold];
-                PlanSettings { motions }.build(&stage)?[AxisName::X].clone()
-            }
-            PhaseMotion::Recorded(table) => Motion::Recorded(table.clone()),
-        };
-        let moves = motion != Motion::Hold;
+        let motions = [phase.motion, MotionSettings::Hold, MotionSettings::Hold];
+        let motion = PlanSettings { motions }.build(&stage)?[AxisName::X].clone();
         machine.set_motion(AxisName::X, motion);
         let starting = (START_S * rate_hz) as usize;
-        let resting = (phase.rest_s * rate_hz) as usize;
         for tick in 0.. {
             if tick == starting
                 && let Some(rpm) = phase.spindle_rpm
             {
                 machine.set_spindle_speed(SpindleSpeed::from_rpm(rpm, 1.0 / rate_hz));
             }
-            if tick == starting && moves {
+            if tick == starting {
                 requests.push(Command::StartMove(AxisName::X));
             }
             let counts = [plant.read_counter(), 0, 0];
@@ -225,22 +166,15 @@ pub(super) fn run(
             }
             let seen = state.axes()[0].telemetry();
             let running = state.is_running();
-            if running || !moves {
+            if running {
                 let time_s = trace.error_um.len() as f64 / rate_hz;
                 plant.set_load_v(phase.load.at_v(time_s));
                 let error_mm = seen.reference.to_mm(resolution_mm) - plant.position_mm();
                 trace.error_um.push(1e3 * error_mm);
                 trace.scale.push(state.axes()[0].learning().scale());
             }
-            let done = if moves {
-                !running && !trace.error_um.is_empty()
-            } else {
-                tick >= resting
-            };
-            let added = (addition.step(seen) * code_per_v).round() as i32;
-            let code = i32::from(outputs.codes[0].0) + added;
-            let code = code.clamp(i32::from(-i16::MAX), i32::from(i16::MAX)) as i16;
-            plant.step(DacCode(code), outputs.enabled);
+            let done = !running && !trace.error_um.is_empty();
+            plant.step(outputs.codes[0], outputs.enabled);
             if done {
                 break;
             }

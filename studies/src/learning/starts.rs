@@ -2,14 +2,14 @@
 
 use quadrant_law::friction::gms::{GmsElement, GmsElements, GmsParameters};
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_sim::report::{Cell, Column, Table};
 use rayon::prelude::*;
 
-use super::run::{Friction, Nothing, Phase, SINE, cycle_s, run};
+use super::run::{Phase, SINE, cycle_s, nominal, run, under_pid};
+use crate::competitor::Feedforward;
 
 /// Cycles of the sine: three and a half make a minute, the last of them is scored.
-pub(super) const MINUTE_CYCLES: f64 = 3.25;
+const MINUTE_CYCLES: f64 = 3.25;
 
 /// A start: its name, the settings, and what comes before the minute.
 struct Start {
@@ -31,13 +31,13 @@ impl Start {
     fn run(
         &self,
         stage: &StageSettings,
-        friction: Friction,
+        feedforward: Feedforward,
         seed: u64,
     ) -> anyhow::Result<(f64, f64, f64)> {
         let mut phases = self.before.clone();
         phases.push(Phase::sine(SINE, MINUTE_CYCLES, nominal()));
-        let axis = friction.of(&self.axis);
-        let traces = run(stage, &axis, &phases, &mut Nothing, seed)?;
+        let axis = under_pid(&self.axis, feedforward);
+        let traces = run(stage, &axis, &phases, seed)?;
         let last = &traces[phases.len() - 1];
         let scored_s = cycle_s(SINE);
         Ok((
@@ -48,13 +48,8 @@ impl Start {
     }
 }
 
-pub(super) fn nominal() -> AxisParameters {
-    let [x, ..] = StageParameters::real().axes;
-    x
-}
-
 /// The gains of the whole friction feedforward, times a factor.
-pub(super) fn with_gains(axis: &AxisSettings, factor: f64) -> AxisSettings {
+fn with_gains(axis: &AxisSettings, factor: f64) -> AxisSettings {
     let mut axis = axis.clone();
     let gains = &mut axis.feedforward.gains;
     for gain in [&mut gains.gms, &mut gains.level, &mut gains.viscous] {
@@ -98,7 +93,7 @@ fn even_elements(level_v: f64, range_mm: f64) -> GmsElements {
 
 /// The settings of an axis with friction from a catalogue: one level for both senses, no Stribeck effect, no viscous friction,
 /// and a pre-sliding range that nobody has measured.
-pub(super) fn catalogue(axis: &AxisSettings, level_v: f64, range_mm: f64) -> AxisSettings {
+fn catalogue(axis: &AxisSettings, level_v: f64, range_mm: f64) -> AxisSettings {
     let mut axis = axis.clone();
     let sliding = &mut axis.friction.sliding;
     for model in [&mut sliding.positive, &mut sliding.negative] {
@@ -147,10 +142,10 @@ fn table(
         .into_par_iter()
         .map(|start| {
             let mut row = vec![Cell::text(&start.name)];
-            for friction in Friction::ALL {
-                let (learnt, largest, rms) = start.run(stage, friction, seed)?;
+            for feedforward in Feedforward::ALL {
+                let (learnt, largest, rms) = start.run(stage, feedforward, seed)?;
                 row.extend([Cell::number(largest, 1), Cell::number(rms, 1)]);
-                if friction == Friction::Learning {
+                if feedforward == Feedforward::Learning {
                     row.push(Cell::number(learnt, 3));
                 }
             }

@@ -118,7 +118,7 @@ pub fn cases() -> Vec<Subject> {
 }
 
 /// Commissions and judges the named axes, and prints a table of them, in Markdown.
-pub(super) fn table() {
+pub fn print_table() {
     say!("Simulated, not measured\n");
     say!(
         "| axis | result | feedforward | largest error against the PID: mean, worst | axis time |"

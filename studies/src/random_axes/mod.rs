@@ -4,12 +4,16 @@
 //! the PID that it designed. A result is one line of a CSV file, so that a campaign can be interrupted, divided and merged.
 
 pub mod cases;
-pub mod command;
 mod page;
 mod plant;
 mod subject;
+mod summary;
 
+use std::path::PathBuf;
 use std::time::Instant;
+
+use clap::Args;
+use quadrant_cli::warn;
 
 use quadrant_law::axes::AxisName;
 use quadrant_law::feedforward::FeedforwardKind;
@@ -30,11 +34,73 @@ use quadrant_sim::plant::StageParameters;
 use quadrant_sim::record::Recording;
 use serde::{Deserialize, Serialize};
 
+use crate::campaign::{Campaign, Lines, make_folder};
 pub use plant::RandomAxis;
 pub use subject::Subject;
 
+/// `quadrant-studies axes`.
+#[derive(Clone, Debug, Args)]
+pub struct Axes {
+    /// Folder for a page of each axis: what was found beside what is true, and everything that was tried.
+    #[arg(long, value_name = "FOLDER")]
+    pages: Option<PathBuf>,
+    /// Only axes without a resonance.
+    #[arg(long)]
+    rigid: bool,
+}
+
+impl Campaign for Axes {
+    type Line = Line;
+    const NAME: &'static str = "axes";
+    const COLUMNS: &'static [&'static str] = &[
+        "outcome",
+        "worst_ratio",
+        "mean_ratio",
+        "pid_um",
+        "small_worse",
+        "small_ratio",
+        "small_sine",
+        "trial_worst",
+        "gain_ratio",
+        "feedforward",
+        "axis_min",
+        "computed_s",
+        "axis",
+        "reason",
+    ];
+
+    fn prepare(&self) -> anyhow::Result<()> {
+        make_folder(self.pages.as_deref())
+    }
+
+    fn requests(&self, seed: u64) -> bool {
+        !self.rigid || RandomAxis::new(seed).is_rigid()
+    }
+
+    /// Commissions the axis of a seed, judges the result, and leaves its page in a folder.
+    fn judge(&self, seed: u64) -> Line {
+        let subject = RandomAxis::new(seed).subject();
+        let judged = judged(&subject, Path::of(seed), Judging::SmallToo);
+        if let Some(folder) = &self.pages {
+            let path = folder.join(format!("{seed}.html"));
+            // The result is worth more than its page.
+            if let Err(error) = page::page(&subject, &judged).write_html(&path) {
+                warn!("{}: {error}", path.display());
+            }
+        }
+        judged.line
+    }
+
+    fn summarise(lines: &Lines<Line>) -> anyhow::Result<()> {
+        summary::print(lines);
+        Ok(())
+    }
+}
+
 /// Result of one axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, strum::Display)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, strum::Display, strum::VariantArray,
+)]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum Outcome {
@@ -54,31 +120,20 @@ pub enum Outcome {
     LeftTravel,
 }
 
-/// One line of a campaign's results.
+/// Result of a seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Line {
-    pub seed: u64,
     pub outcome: Outcome,
     /// Largest error over that of the PID: the worst of the judging sines.
     pub worst_ratio: Option<f64>,
     /// Largest error over that of the PID: the geometric mean.
     pub mean_ratio: Option<f64>,
     /// The PID's largest error of all judging sines, um.
-    #[serde(default)]
     pub pid_um: Option<f64>,
-    /// Largest error over that of the PID: the worst of the small slow sines, with its amplitude and velocity.
-    #[serde(default)]
-    pub small_ratio: Option<f64>,
-    #[serde(default)]
-    pub small_sine: String,
-    /// Small slow sines on which it is worse than the PID.
-    #[serde(default)]
-    pub small_worse: usize,
+    pub small: Small,
     /// Error over that of the PID, the worst of the trials by which the commissioning chose its law.
-    #[serde(default)]
     pub trial_worst: Option<f64>,
     /// Acceleration per volt that was identified, over the true one.
-    #[serde(default)]
     pub gain_ratio: Option<f64>,
     /// Feedforward that was chosen.
     pub feedforward: String,
@@ -90,6 +145,16 @@ pub struct Line {
     pub axis: String,
     /// Reason of a refusal.
     pub reason: String,
+}
+
+/// Result on the small slow sines.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Small {
+    /// Sines on which it is worse than the PID.
+    pub worse: usize,
+    /// Largest error over that of the PID: the worst of them, with its amplitude and velocity.
+    pub ratio: Option<f64>,
+    pub sine: String,
 }
 
 /// Sines on which results are judged: none of them is a trial of the commissioning.
@@ -319,10 +384,7 @@ fn run(axis: &mut dyn TestAxis, base: &AxisSettings) -> Result<Commissioned, Com
 fn judged(subject: &Subject, path: Path, judging: Judging) -> Judged {
     let began = Instant::now();
     let Subject {
-        seed,
-        parameters,
-        travel,
-        ..
+        parameters, travel, ..
     } = subject;
     let mut base = StageSettings::simulated().axes[0].clone();
     base.encoder.resolution_mm = parameters.resolution_mm;
@@ -337,14 +399,11 @@ fn judged(subject: &Subject, path: Path, judging: Judging) -> Judged {
         }),
     };
     let mut line = Line {
-        seed: *seed,
         outcome: Outcome::RefusedWrongly,
         worst_ratio: None,
         mean_ratio: None,
         pid_um: None,
-        small_ratio: None,
-        small_sine: String::new(),
-        small_worse: 0,
+        small: Small::default(),
         trial_worst: None,
         gain_ratio: None,
         feedforward: String::new(),
@@ -483,10 +542,10 @@ impl Line {
                     continue;
                 }
                 self.outcome = Outcome::WorseWhenSmall;
-                self.small_worse += 1;
-                if self.small_ratio.is_none_or(|worst| ratio(&errors) > worst) {
-                    self.small_ratio = Some(ratio(&errors));
-                    self.small_sine = format!(
+                self.small.worse += 1;
+                if self.small.ratio.is_none_or(|worst| ratio(&errors) > worst) {
+                    self.small.ratio = Some(ratio(&errors));
+                    self.small.sine = format!(
                         "{amplitude_mm} mm at {velocity_mm_s} mm/s: {:.1} um for {:.1}",
                         1e3 * errors[0],
                         1e3 * errors[1]

@@ -3,9 +3,10 @@
 //!
 //! The invariants are stated here once, by constants of their own: nothing of it is taken from the code under test.
 
-pub mod command;
 mod restart;
+mod summary;
 
+use clap::Args;
 use quadrant::link::message::{
     AxisName, AxisSet, Body, Harmonic, InjectRequest, Motion, Plan, PointToPoint, Reply,
     SettingsRequest, Voltages,
@@ -20,6 +21,33 @@ use quadrant_fault_bench::noise::Noise;
 use quadrant_fault_bench::plant::{DEATHS, Death, Encoder, FLICKERS, MODEL, Plant};
 use quadrant_fault_bench::tasks::{Moved, Tasks};
 use serde::{Deserialize, Serialize};
+
+use crate::campaign::{self, Lines};
+
+/// `quadrant-studies faults`.
+#[derive(Clone, Debug, Args)]
+pub struct Faults {}
+
+impl campaign::Campaign for Faults {
+    type Line = Line;
+    const NAME: &'static str = "faults";
+    const COLUMNS: &'static [&'static str] = &[
+        "broken",
+        "unplanned_mm",
+        "unseen",
+        "fault",
+        "was_cut",
+        "campaign",
+    ];
+
+    fn judge(&self, seed: u64) -> Line {
+        judge(seed)
+    }
+
+    fn summarise(lines: &Lines<Line>) -> anyhow::Result<()> {
+        summary::print(lines)
+    }
+}
 
 /// Largest word: 10 V of 10 V.
 const LARGEST_WORD: i16 = 32_767;
@@ -445,10 +473,9 @@ struct End {
     was_cut: bool,
 }
 
-/// One line of the results.
+/// Result of a seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Line {
-    pub seed: u64,
     /// The invariant that did not hold; empty if all did.
     pub broken: String,
     /// Largest way that the reference did not ask for until the outputs were off, mm.
@@ -472,7 +499,6 @@ pub fn judge(seed: u64) -> Line {
         Err(why) => (None, why),
     };
     Line {
-        seed,
         broken,
         unplanned_mm: end.as_ref().map(|end| end.unplanned_mm),
         unseen: end.as_ref().map(|end| end.unseen),

@@ -1,62 +1,40 @@
-//! The robustness experiment's tables and figures.
+//! The robustness experiment's tables: one for each score, and one of everything.
 
 use quadrant_sim::experiment::metrics::{Metric, Score, change_percent};
 use quadrant_sim::pages::{UM_PER_MM, statistic_cells};
-use quadrant_sim::report::{Block, Cell, Column, Section, Table};
+use quadrant_sim::report::{Block, Cell, Column, Table};
 
-use crate::robustness::compliance::{Compliance, FREQUENCIES_HZ, LOAD_V};
-use crate::robustness::figures::{compliance_figure, dots, error_figure};
-use crate::robustness::study::RobustnessReport;
-use crate::robustness::{RobustnessOutcome, baseline, find};
+use super::{Outcome, Request, baseline, find};
 
-impl RobustnessReport {
-    /// The competitors, in the order in which they ran.
-    pub(super) fn competitors(&self) -> Vec<&str> {
-        let mut names: Vec<&str> = Vec::new();
-        for outcome in &self.outcomes {
-            if !names.contains(&outcome.competitor.as_str()) {
-                names.push(&outcome.competitor);
-            }
-        }
-        names
-    }
+/// The tables.
+pub(super) fn blocks(request: &Request, outcomes: &[Outcome]) -> Vec<Block> {
+    let mut tables = Metric::ALL
+        .map(|metric| score_table(metric, request, outcomes))
+        .to_vec();
+    tables.push(full_table(request, outcomes));
+    tables.into_iter().map(Block::Table).collect()
 }
 
-/// The tables: one for each score, with the change against the same competitor in the nominal scenario of the task; the
-/// drives that were refused; the compliances.
-pub fn robustness_tables(report: &RobustnessReport) -> Vec<Table> {
-    let mut tables: Vec<Table> = Metric::ALL
-        .into_iter()
-        .map(|metric| score_table(metric, report))
-        .collect();
-    if !report.refused.is_empty() {
-        tables.push(refused_table(report));
-    }
-    if !report.compliances.is_empty() {
-        tables.push(compliance_table(&report.compliances));
-    }
-    tables
-}
-
-fn score_table(metric: Metric, report: &RobustnessReport) -> Table {
-    let competitors = report.competitors();
+/// A score, with the change against the same competitor in the nominal scenario of the task.
+fn score_table(metric: Metric, request: &Request, outcomes: &[Outcome]) -> Table {
     let mut columns = vec![Column::new("Scenario")];
-    for competitor in &competitors {
-        columns.push(Column::with_unit(*competitor, "um"));
+    for (competitor, _) in &request.competitors {
+        columns.push(Column::with_unit(competitor, "um"));
         columns.push(Column::with_unit("change", "%"));
     }
-    let rows = report
+    let rows = request
         .scenarios
         .iter()
         .map(|scenario| {
-            let mut row = vec![Cell::text(&scenario.name)];
-            for competitor in &competitors {
-                let outcome = find(&report.outcomes, &scenario.name, competitor);
-                row.extend(outcome.map_or([Cell::Missing, Cell::Missing], |outcome| {
-                    score_cells(metric.read, outcome, &report.outcomes)
-                }));
-            }
-            row
+            let cells = request.competitors.iter().flat_map(|(competitor, _)| {
+                let outcome = find(outcomes, &scenario.name, competitor);
+                outcome.map_or([Cell::Missing, Cell::Missing], |outcome| {
+                    score_cells(metric.read, outcome, outcomes)
+                })
+            });
+            std::iter::once(Cell::text(&scenario.name))
+                .chain(cells)
+                .collect()
         })
         // A task without reversals has no glitch.
         .filter(|row: &Vec<Cell>| row[1..].iter().any(|cell| *cell != Cell::Missing))
@@ -73,11 +51,7 @@ fn score_table(metric: Metric, report: &RobustnessReport) -> Table {
 }
 
 /// A score and its change; where every run was switched off, the fault's number.
-fn score_cells(
-    read: fn(&Score) -> f64,
-    outcome: &RobustnessOutcome,
-    outcomes: &[RobustnessOutcome],
-) -> [Cell; 2] {
+fn score_cells(read: fn(&Score) -> f64, outcome: &Outcome, outcomes: &[Outcome]) -> [Cell; 2] {
     let Some(own) = outcome.statistic(read) else {
         let faults = outcome.faults();
         let cell = faults.first().map_or(Cell::Missing, |fault| {
@@ -97,23 +71,28 @@ fn score_cells(
 }
 
 /// Every number with its spread.
-pub fn robustness_full_table(report: &RobustnessReport) -> Table {
-    let mut columns = vec![
-        Column::new("Scenario"),
-        Column::new("Task"),
-        Column::new("Law"),
-    ];
+fn full_table(request: &Request, outcomes: &[Outcome]) -> Table {
+    let mut columns = ["Scenario", "What is different", "Task", "Law"]
+        .map(Column::new)
+        .to_vec();
     for Metric { name, .. } in Metric::ALL {
         columns.push(Column::with_unit(name, "um"));
         columns.push(Column::with_unit(format!("{name} +-"), "um"));
     }
-    columns.extend([Column::new("Runs"), Column::new("Switched off")]);
-    let rows = report
-        .outcomes
+    columns.extend(["Runs", "Switched off"].map(Column::new));
+    let difference = |outcome: &Outcome| {
+        let scenario = request
+            .scenarios
+            .iter()
+            .find(|it| it.name == outcome.scenario);
+        scenario.map_or("", |it| it.what.as_str())
+    };
+    let rows = outcomes
         .iter()
         .map(|outcome| {
             let mut row = vec![
                 Cell::text(&outcome.scenario),
+                Cell::text(difference(outcome)),
                 Cell::text(outcome.task.name()),
                 Cell::text(&outcome.competitor),
             ];
@@ -131,145 +110,10 @@ pub fn robustness_full_table(report: &RobustnessReport) -> Table {
         .collect();
     Table {
         id: "robustness".to_owned(),
-        caption: "Every scenario and law: mean and standard deviation over the seeds".to_owned(),
+        caption: "Every scenario and law: mean and standard deviation over the seeds. The numbers of the scenarios are chosen, none \
+                  measured"
+            .to_owned(),
         columns,
         rows,
     }
-}
-
-fn refused_table(report: &RobustnessReport) -> Table {
-    Table {
-        id: "robustness-refused".to_owned(),
-        caption: "Drives on which the commissioning ended early".to_owned(),
-        columns: vec![
-            Column::new("Drive"),
-            Column::new("What it is"),
-            Column::new("Why"),
-        ],
-        rows: report
-            .refused
-            .iter()
-            .map(|(drive, why)| {
-                let why = why.to_string();
-                [&drive.name, &drive.what, &why].map(Cell::text).into()
-            })
-            .collect(),
-    }
-}
-
-fn scenario_table(report: &RobustnessReport) -> Table {
-    Table {
-        id: "robustness-scenarios".to_owned(),
-        caption: "The scenarios; their numbers are chosen, none measured".to_owned(),
-        columns: vec![
-            Column::new("Scenario"),
-            Column::new("Task"),
-            Column::new("What is different"),
-        ],
-        rows: report
-            .scenarios
-            .iter()
-            .map(|scenario| {
-                [scenario.name.as_str(), scenario.task.name(), &scenario.what]
-                    .map(Cell::text)
-                    .into()
-            })
-            .collect(),
-    }
-}
-
-fn compliance_table(compliances: &[Compliance]) -> Table {
-    let mut columns = vec![Column::with_unit("Frequency", "Hz")];
-    columns.extend(
-        compliances
-            .iter()
-            .map(|compliance| Column::with_unit(&compliance.name, "um/V")),
-    );
-    let rows = FREQUENCIES_HZ
-        .iter()
-        .enumerate()
-        .map(|(index, frequency_hz)| {
-            let mut row = vec![Cell::number(*frequency_hz, 0)];
-            row.extend(compliances.iter().map(|compliance| {
-                compliance.mm_per_v[index]
-                    .map_or(Cell::Missing, |value| Cell::number(value * UM_PER_MM, 2))
-            }));
-            row
-        })
-        .collect();
-    Table {
-        id: "robustness-compliance".to_owned(),
-        caption: format!(
-            "Largest error at rest under a sinusoidal load of {LOAD_V} V at the amplifier's input, over that load"
-        ),
-        columns,
-        rows,
-    }
-}
-
-/// The report's sections: scenarios, scores, errors over time under loads, compliance.
-pub fn robustness_sections(report: &RobustnessReport) -> Vec<Section> {
-    let mut scores: Vec<Block> = robustness_tables(report)
-        .into_iter()
-        .filter(|table| table.id != "robustness-compliance")
-        .map(Block::Table)
-        .collect();
-    scores.insert(0, Block::Figure(dots(report)));
-    scores.push(Block::Table(robustness_full_table(report)));
-    let mut sections = vec![
-        Section {
-            provenance: None,
-            id: "robustness-scenarios-section".to_owned(),
-            heading: "Scenarios".to_owned(),
-            prose: vec![scenario_prose()],
-            blocks: vec![Block::Table(scenario_table(report))],
-        },
-        Section {
-            provenance: None,
-            id: "robustness-scores".to_owned(),
-            heading: "Errors by scenario".to_owned(),
-            prose: vec![],
-            blocks: scores,
-        },
-        Section {
-            provenance: None,
-            id: "robustness-errors".to_owned(),
-            heading: "Error over time under a load".to_owned(),
-            prose: vec![],
-            blocks: report
-                .scenarios
-                .iter()
-                .filter(|scenario| scenario.keeps_trace)
-                .map(|scenario| Block::Figure(error_figure(report, scenario)))
-                .collect(),
-        },
-    ];
-    if !report.compliances.is_empty() {
-        sections.push(Section {
-            provenance: None,
-            id: "robustness-compliance-section".to_owned(),
-            heading: "Compliance".to_owned(),
-            prose: vec![compliance_prose()],
-            blocks: vec![
-                Block::Figure(compliance_figure(&report.compliances)),
-                Block::Table(compliance_table(&report.compliances)),
-            ],
-        });
-    }
-    sections
-}
-
-fn scenario_prose() -> String {
-    "The settings are those of the axis as it was commissioned, and stay as they are while the axis changes. Another drive \
-     is another machine: there each law has the gains and models that the same commissioning found on it. A stage that \
-     switches itself off is a result, given as its fault's number. Simulated, not measured."
-        .to_owned()
-}
-
-fn compliance_prose() -> String {
-    "The linear model's compliance is P / (1 + L), with the identified plant and the sampled loop of its PID. Without \
-     friction the simulated axis must show the same. On the axis as it is, friction takes part of the load, and the error is \
-     not proportional to it: the points hold for this amplitude. At rest the feedforward is silent; laws that differ in \
-     nothing else are one."
-        .to_owned()
 }

@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use quadrant_settings::AxisSettings;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::{Force, Load};
-use quadrant_sim::plant::{AxisParameters, NEWTONS_PER_VOLT, StageParameters};
+use quadrant_sim::plant::{AxisParameters, Imperfections, NEWTONS_PER_VOLT, StageParameters};
 
 use crate::robustness::Task;
 
@@ -22,11 +21,6 @@ pub struct Scenario {
     pub load: Load,
     /// Task of the axis.
     pub task: Task,
-    /// Settings from a commissioning of this axis, where it is another machine; otherwise the settings stay as they
-    /// were.
-    pub commissioned: Option<AxisSettings>,
-    /// True if the error over time is kept.
-    pub keeps_trace: bool,
 }
 
 impl Scenario {
@@ -37,31 +31,15 @@ impl Scenario {
             truth,
             load: Load::None,
             task,
-            commissioned: None,
-            keeps_trace: false,
         }
     }
 
     fn loaded(mut self, load: Load) -> Self {
         self.load = load;
-        self.keeps_trace = true;
         self
-    }
-
-    /// The sine on another machine, under the settings that were found on it.
-    pub fn on_drive(name: &str, what: &str, truth: AxisParameters, found: AxisSettings) -> Self {
-        Self {
-            commissioned: Some(found),
-            ..Self::new(Task::Sine, name, what, truth)
-        }
     }
 }
 
-/// A hold, s, all of it scored.
-const HOLD: Task = Task::Hold {
-    seconds: 4.0,
-    scored_from: 0.0,
-};
 /// Start and end of the cut in a hold and in a slow move, s.
 const ENGAGED_S: (f64, f64) = (1.0, 3.0);
 /// The same in a sine, s: all of it.
@@ -77,7 +55,7 @@ fn milling(cut: Milling, engaged_s: (f64, f64)) -> Load {
     }
 }
 
-/// All scenarios of an axis (0 to 2) of the simulated stage but those of other drives; `recorded` adds those of a recorded
+/// All scenarios of an axis (0 to 2) of the simulated stage; `recorded` adds those of a recorded
 /// force.
 pub fn scenarios(axis: usize, recorded: Option<Force>) -> Vec<Scenario> {
     let nominal = || StageParameters::real().axes[axis].clone();
@@ -89,9 +67,14 @@ pub fn scenarios(axis: usize, recorded: Option<Force>) -> Vec<Scenario> {
             .loaded(milling(Milling::slot(), ALWAYS_S)),
         sine("light cutting", "finishing cut all along", nominal())
             .loaded(milling(Milling::finishing(), ALWAYS_S)),
-        Scenario::new(HOLD, "hold", "position held", nominal()),
-        Scenario::new(HOLD, "hold, cutting", "slot milled for 2 s", nominal())
-            .loaded(milling(Milling::slot(), ENGAGED_S)),
+        Scenario::new(Task::Hold, "hold", "position held", nominal()),
+        Scenario::new(
+            Task::Hold,
+            "hold, cutting",
+            "slot milled for 2 s",
+            nominal(),
+        )
+        .loaded(milling(Milling::slot(), ENGAGED_S)),
         Scenario::new(Task::SlowFeed, "slow feed", "10 mm at 2 mm/s", nominal()),
         Scenario::new(
             Task::SlowFeed,
@@ -109,7 +92,7 @@ pub fn scenarios(axis: usize, recorded: Option<Force>) -> Vec<Scenario> {
         all.extend([
             sine("recorded force", "the file's force all along", nominal()).loaded(load.clone()),
             Scenario::new(
-                HOLD,
+                Task::Hold,
                 "hold, recorded force",
                 "the file's force all along",
                 nominal(),
@@ -125,6 +108,9 @@ fn changed_axes(
     sine: impl Fn(&str, &str, AxisParameters) -> Scenario,
 ) -> Vec<Scenario> {
     let axis = || nominal.clone();
+    let with = |name: &str, what: &str, change: fn(&mut Imperfections)| {
+        sine(name, what, axis().with_imperfection(change))
+    };
     vec![
         sine("mass +30 %", "moving mass x 1.3", axis().with_mass(1.3)),
         sine("mass -30 %", "moving mass x 0.7", axis().with_mass(0.7)),
@@ -148,51 +134,41 @@ fn changed_axes(
             "all friction x 0.5",
             axis().with_friction(0.5),
         ),
-        sine(
+        with(
             "friction along the travel",
             "friction +-20 % over 40 mm",
-            axis().with_imperfection(|it| {
-                it.friction_variation = 0.2;
-                it.friction_period_mm = 40.0;
-            }),
+            |it| {
+                (it.friction_variation, it.friction_period_mm) = (0.2, 40.0);
+            },
         ),
-        sine(
+        with(
             "offset 50 mV",
             "amplifier offset 50 mV in place of a few",
-            axis().with_imperfection(|it| it.offset_v = 0.050),
+            |it| it.offset_v = 0.050,
         ),
-        sine(
-            "amplifier +10 %",
-            "amplifier gain x 1.1",
-            axis().with_imperfection(|it| it.amplifier_gain_error = 0.1),
-        ),
-        sine(
-            "amplifier -10 %",
-            "amplifier gain x 0.9",
-            axis().with_imperfection(|it| it.amplifier_gain_error = -0.1),
-        ),
+        with("amplifier +10 %", "amplifier gain x 1.1", |it| {
+            it.amplifier_gain_error = 0.1
+        }),
+        with("amplifier -10 %", "amplifier gain x 0.9", |it| {
+            it.amplifier_gain_error = -0.1
+        }),
         sine(
             "delay +1 sample",
             "dead time + 0.1 ms",
             axis().with_more_delay(1e-4),
         ),
-        sine(
-            "encoder noise 0.5 um",
-            "RMS, in place of 0.15 um",
-            axis().with_imperfection(|it| it.encoder_noise_mm = 5e-4),
-        ),
-        sine(
-            "encoder noise 1 um",
-            "RMS, in place of 0.15 um",
-            axis().with_imperfection(|it| it.encoder_noise_mm = 1e-3),
-        ),
-        sine(
+        with("encoder noise 0.5 um", "RMS, in place of 0.15 um", |it| {
+            it.encoder_noise_mm = 5e-4
+        }),
+        with("encoder noise 1 um", "RMS, in place of 0.15 um", |it| {
+            it.encoder_noise_mm = 1e-3
+        }),
+        with(
             "encoder interpolation",
             "0.3 um in every 20 um of the grating",
-            axis().with_imperfection(|it| {
-                it.interpolation_mm = 3e-4;
-                it.grating_mm = 0.020;
-            }),
+            |it| {
+                (it.interpolation_mm, it.grating_mm) = (3e-4, 0.020);
+            },
         ),
     ]
 }

@@ -2,20 +2,20 @@
 
 use std::f64::consts::TAU;
 
+use anyhow::{Context, bail};
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant_law::safety::{Fault, SafetyState};
 use quadrant_settings::Job;
-use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
+use quadrant_settings::{PlanSettings, StageSettings};
 use quadrant_sim::compare::sine::AMPLITUDE_MM;
 use quadrant_sim::experiment::configuration::ELEMENTS;
 use quadrant_sim::experiment::metrics::{Score, largest, rms, score};
 use quadrant_sim::experiment::run::AxisTrace;
 use quadrant_sim::machine::law::TickInput;
 use quadrant_sim::machine::{LawMachine, Operator};
-use quadrant_sim::plant::load::Load;
-use quadrant_sim::plant::{AxisParameters, SimulatedAxis};
+use quadrant_sim::plant::SimulatedAxis;
 
-use crate::robustness::RobustnessError;
+use super::Scenario;
 
 /// Task of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,20 +24,18 @@ pub enum Task {
     Sine,
     /// A move of 10 mm at 2 mm/s, scored from its start to its end.
     SlowFeed,
-    Hold {
-        /// For how long, s.
-        seconds: f64,
-        /// Share of that time after which scoring begins, 0 to below 1.
-        scored_from: f64,
-    },
+    /// A position held for 4 s.
+    Hold,
 }
 
+/// Length of a hold, s.
+const HOLD_S: f64 = 4.0;
 /// Largest velocity of the sine, mm/s.
-pub(super) const SINE_MM_S: f64 = 10.0;
+const SINE_MM_S: f64 = 10.0;
 /// Length of the slow move, mm.
-pub(super) const FEED_MM: f64 = 10.0;
+const FEED_MM: f64 = 10.0;
 /// Its velocity, mm/s.
-pub(super) const FEED_MM_S: f64 = 2.0;
+const FEED_MM_S: f64 = 2.0;
 /// Cycles at full speed: the comparison's.
 const CYCLES: f64 = 2.25;
 /// Whole cycles at the end that are scored.
@@ -45,7 +43,7 @@ const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;
 /// Cycles before, in which a law that learns has time to: five reversals.
-pub(super) const LEARNING_CYCLES: f64 = 2.5;
+const LEARNING_CYCLES: f64 = 2.5;
 /// Time from the enabling to the start of a hold, s: the bumpless transfer has faded.
 const SETTLING_S: f64 = 0.3;
 
@@ -55,7 +53,7 @@ impl Task {
         match self {
             Self::Sine => "sine",
             Self::SlowFeed => "slow feed",
-            Self::Hold { .. } => "hold",
+            Self::Hold => "hold",
         }
     }
 
@@ -73,7 +71,7 @@ impl Task {
                 max_acceleration_mm_s2: 50.0,
                 max_jerk_mm_s3: 1000.0,
             }),
-            Self::Hold { .. } => MotionSettings::Hold,
+            Self::Hold => MotionSettings::Hold,
         }
     }
 
@@ -82,12 +80,12 @@ impl Task {
         let task = match self {
             Self::Sine => cycles * TAU * AMPLITUDE_MM / SINE_MM_S + 2.0 * LEAD_S,
             Self::SlowFeed => FEED_MM / FEED_MM_S,
-            Self::Hold { seconds, .. } => seconds,
+            Self::Hold => HOLD_S,
         };
         task + 2.0
     }
 
-    fn score(self, trace: &AxisTrace, rate_hz: f64, cycles: f64) -> (Score, AxisTrace) {
+    fn score(self, trace: &AxisTrace, rate_hz: f64, cycles: f64) -> Score {
         let samples = |seconds: f64| (seconds * rate_hz).round() as usize;
         match self {
             Self::Sine => {
@@ -95,16 +93,9 @@ impl Task {
                 let cycle = samples(cycle_s);
                 let end = samples(LEAD_S) + samples(cycles * cycle_s);
                 let scored = trace.slice(end - SCORED_CYCLES * cycle..end);
-                (
-                    score(&scored.reference_mm, &scored.error_mm, cycle),
-                    trace.slice(end - cycle..end),
-                )
+                score(&scored.reference_mm, &scored.error_mm, cycle)
             }
-            Self::SlowFeed => (without_reversals(&trace.error_mm), trace.clone()),
-            Self::Hold { scored_from, .. } => {
-                let first = (scored_from * trace.error_mm.len() as f64) as usize;
-                (without_reversals(&trace.error_mm[first..]), trace.clone())
-            }
+            Self::SlowFeed | Self::Hold => without_reversals(&trace.error_mm),
         }
     }
 }
@@ -120,46 +111,16 @@ fn without_reversals(errors: &[f64]) -> Score {
 /// A run to make; the axis under test is the first of the stage, the others stand still.
 pub(super) struct Trial<'a> {
     pub(super) stage: &'a StageSettings,
-    pub(super) truth: &'a AxisParameters,
-    pub(super) load: &'a Load,
-    pub(super) task: Task,
+    pub(super) scenario: &'a Scenario,
     pub(super) seed: u64,
 }
 
-/// End of a run.
-pub(super) struct Ended {
-    /// Its score, or what switched the stage off.
-    pub(super) score: Result<Score, Fault>,
-    /// Trace, where it is worth showing, if the run ended well.
-    pub(super) trace: Option<AxisTrace>,
-}
-
-/// Reasons for which a run has no result.
-pub(super) enum Stopped {
-    Settings(SettingsError),
-    Endless(usize),
-}
-
-impl Stopped {
-    pub(super) fn named(self, competitor: &str, scenario: &str) -> RobustnessError {
-        let (competitor, scenario) = (competitor.to_owned(), scenario.to_owned());
-        match self {
-            Self::Settings(source) => RobustnessError::Settings {
-                competitor,
-                scenario,
-                source,
-            },
-            Self::Endless(ticks) => RobustnessError::Endless {
-                competitor,
-                scenario,
-                ticks,
-            },
-        }
-    }
-}
-
 impl Trial<'_> {
-    pub(super) fn run(&self) -> Result<Ended, Stopped> {
+    /// The score, or the fault that switched the stage off.
+    pub(super) fn run(&self) -> anyhow::Result<Result<Score, Fault>> {
+        let Scenario {
+            truth, load, task, ..
+        } = self.scenario;
         // The others are left out, and like it, so that it waits for none.
         let [axis, ..] = &self.stage.axes;
         let cycles = match axis.feedforward.learning {
@@ -173,19 +134,19 @@ impl Trial<'_> {
             },
             plan: PlanSettings {
                 motions: [
-                    self.task.motion(cycles),
+                    task.motion(cycles),
                     MotionSettings::Hold,
                     MotionSettings::Hold,
                 ],
             },
         })
-        .map_err(Stopped::Settings)?
+        .context("settings refused")?
         .with_x_alone();
         let rate_hz = self.stage.rate_hz;
         let resolution_mm = self.stage.axes[0].encoder.resolution_mm;
-        let mut plant = SimulatedAxis::new(self.truth.clone(), rate_hz, self.seed);
+        let mut plant = SimulatedAxis::new(truth.clone(), rate_hz, self.seed);
         let mut operator = Operator::runs_the_plan();
-        let most_ticks = (self.task.longest_s(cycles) * rate_hz) as usize;
+        let most_ticks = (task.longest_s(cycles) * rate_hz) as usize;
         let mut trace = AxisTrace::default();
         let mut enabled_ticks = 0.0;
         for tick in 0..most_ticks {
@@ -195,31 +156,24 @@ impl Trial<'_> {
             ));
             let state = machine.state();
             if let SafetyState::Faulted(fault) = state.safety() {
-                return Ok(Ended {
-                    score: Err(fault),
-                    trace: None,
-                });
+                return Ok(Err(fault));
             }
             enabled_ticks += if outputs.enabled { 1.0 } else { 0.0 };
-            let under_way = match self.task {
+            let under_way = match *task {
                 Task::Sine | Task::SlowFeed => state.is_running(),
-                Task::Hold { seconds, .. } => {
-                    (SETTLING_S..SETTLING_S + seconds).contains(&(enabled_ticks / rate_hz))
+                Task::Hold => {
+                    (SETTLING_S..SETTLING_S + HOLD_S).contains(&(enabled_ticks / rate_hz))
                 }
             };
             if under_way {
-                plant.set_load_v(self.load.at_v(trace.error_mm.len() as f64 / rate_hz));
+                plant.set_load_v(load.at_v(trace.error_mm.len() as f64 / rate_hz));
                 let seen = state.axes()[0].telemetry();
                 trace.push(seen, resolution_mm, plant.position_mm());
             } else if !trace.error_mm.is_empty() {
-                let (score, shown) = self.task.score(&trace, rate_hz, cycles);
-                return Ok(Ended {
-                    score: Ok(score),
-                    trace: Some(shown),
-                });
+                return Ok(Ok(task.score(&trace, rate_hz, cycles)));
             }
             plant.step(outputs.codes[0], outputs.enabled);
         }
-        Err(Stopped::Endless(most_ticks))
+        bail!("the motion has not ended after {most_ticks} ticks")
     }
 }

@@ -1,15 +1,19 @@
 //! Chapter 3 of the thesis on our stage: from experiments to a plant model with friction.
 
-use quadrant_sim::commission::{Commissioned, CrossCheck};
+use quadrant_settings::StageSettings;
+use quadrant_sim::commission::{CommissionSettings, Commissioned, CrossCheck, commission};
 use quadrant_sim::identify::pages::friction::{friction_section, presliding_section};
 use quadrant_sim::identify::pages::linear::{plant_tables, response_section};
 use quadrant_sim::identify::pages::motor_constant::motor_constant_section;
 use quadrant_sim::identify::pages::revise::revise_sections;
+use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::pages::{lines, series};
+use quadrant_sim::plant::StageParameters;
 use quadrant_sim::record::Recording;
 use quadrant_sim::report::{Block, Colour, Figure, Section, Style};
 
-use crate::thesis::numbers::{Number, number};
+use super::Context;
+use super::numbers::{Number, number};
 
 /// The thesis' numbers. Of 3.16 to 3.21 it lists two for each kind of friction.
 const NUMBERS: [Number; 19] = [
@@ -37,8 +41,29 @@ const NUMBERS: [Number; 19] = [
 /// Velocity of Figure 3.8, mm/s.
 const SHOWN_VELOCITY_MM_S: f64 = 2.0;
 
+/// Share of the time after which the commissioning is done and the cross-checks begin.
+const COMMISSIONED: f64 = 0.7;
+
+/// Commissions the x axis from nothing known, and cross-checks the result.
+pub(super) fn sections(
+    context: &Context,
+    advance: &(dyn Fn(f64) + Sync),
+) -> anyhow::Result<Vec<Section>> {
+    let [truth, ..] = StageParameters::real().axes;
+    let mut rig = SimulatedTestAxis::new(0, truth, context.seed);
+    let found = commission(
+        &mut rig,
+        &StageSettings::simulated().axes[0],
+        &CommissionSettings::thesis(),
+        &mut |_, _| {},
+    )?;
+    advance(COMMISSIONED);
+    let checked = CrossCheck::run(&mut rig, &found.settings, context.seed, &mut |_, _| {})?;
+    Ok(chapter3_sections(&found, &checked))
+}
+
 /// Tables 3.1 to 3.4 and Figures 3.5 to 3.21, from a commissioning and its cross-checks.
-pub fn chapter3_sections(found: &Commissioned, checked: &CrossCheck) -> Vec<Section> {
+fn chapter3_sections(found: &Commissioned, checked: &CrossCheck) -> Vec<Section> {
     let (map, friction, runs) = &found.friction;
     let (gms, slow_sine) = &found.presliding;
     let plant = &found.plant.plant;

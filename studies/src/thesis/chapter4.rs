@@ -1,15 +1,23 @@
 //! Chapter 4 of the thesis on our stage: the controllers, and what the runs of chapter 5 are made of.
 
+use anyhow::Context as _;
+use quadrant_law::control::plant_model::PlantModel;
 use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::compare::comparison::AMPLITUDES_MM;
 use quadrant_sim::compare::sine::{CYCLES, SCORED_CYCLES, VELOCITIES_MM_S, cycle_s};
+use quadrant_sim::design::npid::filtered_proof;
 use quadrant_sim::design::pages::npid::NonlinearPage;
 use quadrant_sim::design::pages::pid::PidPage;
+use quadrant_sim::design::robustness::{Uncertainty, robustness};
+use quadrant_sim::design::step_response::{StepRequest, step_response};
+use quadrant_sim::design::time_varying::VaryingLoop;
+use quadrant_sim::design::{Form, Process, best_pid};
 use quadrant_sim::pages::{columns, provenance};
-use quadrant_sim::plant::AxisParameters;
+use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_sim::report::{Block, Cell, Section, Table};
 
-use crate::thesis::numbers::{Number, number};
+use super::Context;
+use super::numbers::{Number, number};
 
 const PID_NUMBERS: [Number; 9] = [
     ("pid-gains", "Table 4.1"),
@@ -31,12 +39,109 @@ const NONLINEAR_NUMBERS: [Number; 5] = [
     ("step-voltage", "Figure 4.11b"),
 ];
 
+/// Standard deviations of A, B, C and Td, as shares: those of `quadrant design npid`.
+const DEVIATIONS: [f64; 4] = [0.05, 0.10, 0.30, 0.05];
+/// Number of draws.
+const DRAWS: usize = 2000;
+/// Heights of the steps, mm: within the encoder's noise, across emax, as `quadrant design npid` has them.
+const STEPS_MM: [f64; 2] = [0.01, 0.1];
+
+/// Examines the settings' PID and nonlinear gain on the settings' model of the x axis.
+pub(super) fn sections(
+    context: &Context,
+    advance: &(dyn Fn(f64) + Sync),
+) -> anyhow::Result<Vec<Section>> {
+    let stage = &context.settings.stage;
+    let [x, ..] = &stage.axes;
+    let plant = x
+        .plant
+        .context("the settings hold no model of the x axis: commission it with `quadrant commission --axis x`")?;
+    let gain = x
+        .feedback
+        .nonlinear
+        .context("the settings hold no nonlinear gain for the x axis: design one with `quadrant design npid`")?;
+    let gains = x.feedback.pid;
+    let filters = x.feedback.filters.as_deref().unwrap_or_default();
+    let sample_time_s = 1.0 / stage.rate_hz;
+    let sampled = Form::Sampled {
+        sample_time_s,
+        computation_delay_s: 0.0,
+    };
+    let process = Process::filtered(plant, filters);
+    let answer = |height_mm, nonlinear| {
+        let request = StepRequest {
+            filters,
+            sample_time_s,
+            height_mm,
+            limit_v: x.amplifier.output_limit_v,
+            ..StepRequest::default()
+        };
+        step_response(&plant, &gains, nonlinear, &request)
+    };
+    let [small_mm, _] = STEPS_MM;
+    let best = best_pid(&process, sampled, gains.derivative_filter_s)?.gains;
+    let pid = PidPage {
+        subject: String::new(),
+        gains,
+        forms: [
+            ("continuous", gains, Form::Continuous),
+            ("as it runs", gains, sampled),
+            ("best PID, as it runs", best, sampled),
+        ]
+        .map(|(name, gains, form)| {
+            (
+                name.to_owned(),
+                process.open_loop(&gains, form),
+                process.margins(&gains, form),
+            )
+        })
+        .into(),
+        step: Some(answer(small_mm, None)),
+    };
+    let margins = process.margins(&gains, sampled)?;
+    let destabiliser = VaryingLoop {
+        plant,
+        gains,
+        filters,
+        sample_time_s,
+    }
+    .worst(1.0, margins.gain_crossover_hz);
+    advance(0.5);
+    let nonlinear = NonlinearPage {
+        subject: String::new(),
+        plant: PlantModel {
+            delay_s: plant.delay_s + 0.5 * sample_time_s,
+            ..plant
+        },
+        gains,
+        filters: filters.to_vec(),
+        proof: filtered_proof(&plant, &gains, filters, sample_time_s),
+        gain,
+        destabiliser,
+        robustness: robustness(
+            &plant,
+            &gains,
+            filters,
+            sample_time_s,
+            &Uncertainty::independent(DEVIATIONS),
+            DRAWS,
+            context.seed,
+        )?,
+        steps: STEPS_MM
+            .into_iter()
+            .flat_map(|height_mm| {
+                [("PID", None), ("N-PID", Some(&gain))]
+                    .map(|(law, nonlinear)| (law, answer(height_mm, nonlinear)))
+            })
+            .collect(),
+    };
+    let [truth, ..] = &StageParameters::real().axes;
+    let data = data_section(stage, truth, context.seeds);
+    Ok(chapter4_sections(&pid, &nonlinear, data))
+}
+
 /// Tables 4.1 to 4.4 and Figures 4.2 to 4.11.
-pub fn chapter4_sections(
-    pid: &PidPage<'_>,
-    nonlinear: &NonlinearPage,
-    data: Section,
-) -> Vec<Section> {
+fn chapter4_sections(pid: &PidPage<'_>, nonlinear: &NonlinearPage, data: Section) -> Vec<Section> {
     // A page's own command is that of the report.
     let pid = pid.page(provenance("", 0)).sections;
     let nonlinear = nonlinear.page(provenance("", 0)).sections;
@@ -51,7 +156,7 @@ pub fn chapter4_sections(
 }
 
 /// Data of the simulation (exact model) and of the experiment (identified model): rates, resolutions, cycles.
-pub fn data_section(stage: &StageSettings, truth: &AxisParameters, seeds: u64) -> Section {
+fn data_section(stage: &StageSettings, truth: &AxisParameters, seeds: u64) -> Section {
     let [x, ..] = &stage.axes;
     Section {
         provenance: None,

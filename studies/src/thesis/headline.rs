@@ -10,7 +10,8 @@ use quadrant_sim::experiment::statistic::Statistic;
 use quadrant_sim::pages::{UM_PER_MM, statistic_cells};
 use quadrant_sim::report::{Block, Cell, Column, Section, Table};
 
-use crate::thesis::imperfections::{Change, Finding};
+use super::Context;
+use super::imperfections::{Change, Finding, study};
 
 /// The measures of the best configuration, with the thesis' figure for each, %. It does not say whether its tracking error is a
 /// largest or an RMS value: it is set beside both.
@@ -19,6 +20,28 @@ const BEST_MEASURES: [(Metric, f64); 3] = [
     (Metric::RMS, -96.5),
     (Metric::GLITCH, -50.0),
 ];
+
+/// Most seeds that the study of imperfections is run with: what it asks about is many times the deviations.
+const STUDY_SEEDS: u64 = 3;
+/// Share of the part's time that the comparison takes.
+const COMPARISON_SHARE: f64 = 0.7;
+
+/// The headlines, and what limits ours.
+pub(super) fn sections(
+    context: &Context,
+    advance: &(dyn Fn(f64) + Sync),
+) -> anyhow::Result<Vec<Section>> {
+    let comparison = context.comparison(&|done| advance(COMPARISON_SHARE * done))?;
+    let [_, identified] = context.setups();
+    let findings = study(
+        &identified,
+        &Change::ALL,
+        context.seed,
+        context.seeds.min(STUDY_SEEDS),
+        &|done| advance((1.0 - COMPARISON_SHARE) * done),
+    )?;
+    Ok(vec![headline_section(comparison), study_section(&findings)])
+}
 
 /// The headlines, and the best configuration by velocity.
 pub fn headline_section(comparison: &Comparison) -> Section {
@@ -131,7 +154,7 @@ pub fn study_section(findings: &[Finding]) -> Section {
     );
     prose.extend(findings.iter().filter_map(|finding| {
         let error = finding.outcome.as_ref().err()?;
-        Some(format!("Left out: {} ({error}).", finding.change.name()))
+        Some(format!("Left out: {} ({error:#}).", finding.change.name()))
     }));
     Section {
         id: "headline-imperfections".to_owned(),

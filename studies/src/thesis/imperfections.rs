@@ -1,17 +1,16 @@
 //! The cost of each imperfection: each is switched off by itself, and the comparison of the
 //! PID with N-PID and combined feedforward is run again. The plant is not tuned; only what is asked about is changed.
 
+use anyhow::Context as _;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant_settings::SettingsError;
 use quadrant_sim::commission::bootstrap::low_bandwidth_settings;
 use quadrant_sim::compare::comparison::{Comparison, Request};
 use quadrant_sim::compare::sine::Sines;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
-use quadrant_sim::identify::virgin_curve;
-use quadrant_sim::identify::virgin_curve::{Knots, VirginCurveError, VirginCurveSettings};
-use quadrant_sim::machine::{ExperimentError, MachineError, SimulatedTestAxis, TestAxis, approach};
+use quadrant_sim::identify::virgin_curve::{self, Knots, VirginCurveSettings};
+use quadrant_sim::machine::{SimulatedTestAxis, TestAxis, approach};
 use quadrant_sim::plant::Imperfections;
 use rayon::prelude::*;
 
@@ -98,11 +97,7 @@ impl Change {
     ///
     /// # Errors
     /// A new identification that fails.
-    pub fn apply(
-        self,
-        setup: &RunConfiguration,
-        seed: u64,
-    ) -> Result<RunConfiguration, StudyError> {
+    pub fn apply(self, setup: &RunConfiguration, seed: u64) -> anyhow::Result<RunConfiguration> {
         let mut changed = setup.clone();
         match self {
             Self::AsItIs => {}
@@ -114,7 +109,9 @@ impl Change {
                 each(&mut changed, |all| all.encoder_noise_mm = 0.0);
                 refine_encoder(&mut changed);
             }
-            Self::Elements(count) => identify_elements(&mut changed, count, seed)?,
+            Self::Elements(count) => {
+                identify_elements(&mut changed, count, seed).context("GMS elements")?;
+            }
             Self::TrueElements => {
                 for (axis, truth) in changed.stage.axes.iter_mut().zip(&changed.truth.axes) {
                     axis.friction.gms = truth.gms.clone();
@@ -137,27 +134,6 @@ impl Change {
     }
 }
 
-/// Reason that something could not be identified again.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyError {
-    /// Settings that the axis refuses.
-    #[error("GMS elements: settings refused: {0}")]
-    Settings(#[from] SettingsError),
-    /// The machine refused settings, or the connection failed.
-    #[error(transparent)]
-    Machine(#[from] MachineError),
-    /// The run of the slow sine.
-    #[error("GMS elements: {0}")]
-    Rig(#[from] ExperimentError),
-    #[error("GMS elements: {0}")]
-    Identification(#[from] VirginCurveError),
-    /// Settings without a model.
-    #[error(
-        "the settings hold no model of the x axis: commission it with `quadrant commission --axis x`"
-    )]
-    NoModel,
-}
-
 /// Changes the imperfections of all axes.
 fn each(setup: &mut RunConfiguration, change: impl Fn(&mut Imperfections)) {
     for axis in &mut setup.truth.axes {
@@ -174,14 +150,12 @@ fn refine_encoder(setup: &mut RunConfiguration) {
 }
 
 /// Measures the slow sine on the x axis as a commissioning does, and identifies `count` elements from it.
-fn identify_elements(
-    setup: &mut RunConfiguration,
-    count: usize,
-    seed: u64,
-) -> Result<(), StudyError> {
+fn identify_elements(setup: &mut RunConfiguration, count: usize, seed: u64) -> anyhow::Result<()> {
     let rate_hz = setup.stage.rate_hz;
     let x = &mut setup.stage.axes[0];
-    let plant = x.plant.ok_or(StudyError::NoModel)?;
+    let plant = x.plant.context(
+        "the settings hold no model of the x axis: commission it with `quadrant commission --axis x`",
+    )?;
     let sliding = &x.friction.sliding;
     let breakaway_v =
         0.5 * (sliding.positive.curve.breakaway_v + sliding.negative.curve.breakaway_v);
@@ -201,7 +175,7 @@ fn identify_elements(
 pub struct Finding {
     pub change: Change,
     /// Results of PID and of the best configuration, or the reason that the change could not be identified.
-    pub outcome: Result<Comparison, StudyError>,
+    pub outcome: anyhow::Result<Comparison>,
 }
 
 /// Runs PID and the best configuration on every changed plant, with `seeds` seeds from `seed` on. `advance` receives
@@ -217,7 +191,7 @@ pub fn study(
     advance: &(dyn Fn(f64) + Sync),
 ) -> Result<Vec<Finding>, RunError> {
     // The identifications run on one core each, so all at once; the runs of a comparison fill the cores by themselves.
-    let changed: Vec<Result<RunConfiguration, StudyError>> = changes
+    let changed: Vec<anyhow::Result<RunConfiguration>> = changes
         .par_iter()
         .map(|change| change.apply(setup, seed))
         .collect();

@@ -14,12 +14,12 @@ fn under_random_cuts_learning_is_hardly_ever_worse_than_no_feedforward_and_far_b
     let (mut learning_um, mut cancelling_um) = (0.0, 0.0);
     for line in &lines {
         println!("{line:?}");
-        assert!(line.worst_ratio.is_finite(), "{line:?}");
-        assert!(line.learning_um < line.off_um, "{line:?}");
-        assert!(line.cancelling_um < line.off_um, "{line:?}");
-        learning_um += line.learning_um;
-        cancelling_um += line.cancelling_um;
-        worse += line.worse_percent / lines.len() as f64;
+        assert!(line.learning.worst_ratio.is_finite(), "{line:?}");
+        assert!(line.learning.rms_um < line.off_um, "{line:?}");
+        assert!(line.cancelling.rms_um < line.off_um, "{line:?}");
+        learning_um += line.learning.rms_um;
+        cancelling_um += line.cancelling.rms_um;
+        worse += line.learning.worse_percent / lines.len() as f64;
     }
     assert!(worse < 5.0, "{worse} % of the windows");
     assert!(cancelling_um < 0.9 * learning_um);
@@ -31,6 +31,6 @@ fn a_voltage_in_quadrature_to_the_model_shakes_the_axis_no_longer_than_the_guard
     for seed in [886, 1039] {
         let line = judge(seed, None);
         println!("{line:?}");
-        assert!(line.cancelling_worst_ratio < 1.5, "{line:?}");
+        assert!(line.cancelling.worst_ratio < 1.5, "{line:?}");
     }
 }

@@ -1,15 +1,14 @@
 //! The studies, tested on the simulated stage.
 
+mod campaign;
 mod chapter5;
 mod command;
 mod cuts;
-mod friction_models;
-mod laws;
+mod friction_truths;
 mod learning;
 mod random_axes;
 mod random_faults;
 mod report_command;
-mod report_parts;
 mod robustness;
-mod robustness_command;
 mod unplanned_motion;
+mod wrong_model;

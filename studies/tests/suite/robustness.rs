@@ -7,28 +7,26 @@ use quadrant_settings::StageSettings;
 use quadrant_sim::compare::sine::run_configuration;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
+use quadrant_sim::plant::NEWTONS_PER_VOLT;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::{Force, Load};
-use quadrant_sim::plant::{NEWTONS_PER_VOLT, StageParameters};
 use quadrant_sim::record::ForceRecord;
-use quadrant_studies::robustness::compliance::{
-    FREQUENCIES_HZ, frictionless, linear_compliance, pid_alone, simulated_compliance,
-};
 use quadrant_studies::robustness::{
-    RobustnessOutcome, RobustnessRequest, Task, baseline, find, run_robustness, scenarios,
-    usual_competitors,
+    Outcome, Request, Task, baseline, find, run as run_scenarios, scenarios, usual_competitors,
 };
+
+use crate::command::{fail, succeed};
 
 fn stage() -> StageSettings {
     identified_settings().unwrap().stage
 }
 
 /// The scenarios of these names on x, under the usual laws.
-fn request(names: &[&str], seed: u64, seeds: u64) -> RobustnessRequest {
+fn request(names: &[&str], seed: u64, seeds: u64) -> Request {
     let mut scenarios = scenarios(0, None);
     scenarios.retain(|scenario| names.contains(&scenario.name.as_str()));
     assert_eq!(scenarios.len(), names.len());
-    RobustnessRequest {
+    Request {
         competitors: usual_competitors(&stage()),
         axis: 0,
         scenarios,
@@ -37,11 +35,11 @@ fn request(names: &[&str], seed: u64, seeds: u64) -> RobustnessRequest {
     }
 }
 
-fn run(request: &RobustnessRequest) -> Vec<RobustnessOutcome> {
-    run_robustness(request, &|| {}).unwrap()
+fn run(request: &Request) -> Vec<Outcome> {
+    run_scenarios(request, &|_| {}).unwrap()
 }
 
-fn largest_um(outcomes: &[RobustnessOutcome], scenario: &str, competitor: &str) -> f64 {
+fn largest_um(outcomes: &[Outcome], scenario: &str, competitor: &str) -> f64 {
     let outcome = find(outcomes, scenario, competitor).unwrap();
     1e3 * outcome.statistic(|score| score.largest_mm).unwrap().mean
 }
@@ -140,7 +138,7 @@ fn compensation_that_was_identified_before_friction_grew_still_helps() {
 }
 
 /// The scenario "cutting" with a force in place of its own, N, repeated every 20 ms.
-fn under(force_n: Vec<f64>) -> Vec<RobustnessOutcome> {
+fn under(force_n: Vec<f64>) -> Vec<Outcome> {
     let mut request = request(&["nominal", "cutting"], 1, 1);
     request.scenarios[1].load = Load::Recorded {
         force: Arc::new(Force {
@@ -171,21 +169,6 @@ fn a_cut_s_vibration_and_not_its_mean_spoils_the_compensation() {
 }
 
 #[test]
-fn without_friction_the_compliance_is_that_of_the_linear_loop() {
-    let alone = pid_alone(&stage());
-    let own = &alone.axes[0];
-    let truth = StageParameters::real().axes[0].clone();
-    let simulated = simulated_compliance("PID", &alone, &frictionless(&truth), 1).unwrap();
-    for (hz, simulated) in FREQUENCIES_HZ.into_iter().zip(simulated.mm_per_v) {
-        let linear = linear_compliance(&own.plant.unwrap(), own, 1e4, hz).norm();
-        let apart = simulated.unwrap() / linear - 1.0;
-        // Above, what is left of the amplitude is a few counts.
-        let allowed = if hz < 150.0 { 0.02 } else { 0.06 };
-        assert!(apart.abs() < allowed, "{hz} Hz: {:.2} %", 100.0 * apart);
-    }
-}
-
-#[test]
 fn every_scenario_has_a_name_of_its_own_and_something_different() {
     let all = scenarios(1, None);
     for (index, scenario) in all.iter().enumerate() {
@@ -213,5 +196,50 @@ fn the_committed_force_is_the_generated_one() {
             let time_s = f64::from(k) * 2e-4;
             assert!((force.at_n(time_s) - cut.force_n(component, time_s)).abs() < 1e-9);
         }
+    }
+}
+
+#[test]
+fn chosen_scenarios_leave_tables_and_a_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let force = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../host-sim/data/synthetic-cutting-force.csv"
+    );
+    let arguments = ["robustness", "--seeds", "1", "--force", force];
+    let chosen = ["--only", "hold, recorded", "--out", "a"];
+    let said = succeed(folder.path(), &[&arguments[..], &chosen].concat());
+    assert!(said.contains("Simulated, not measured"), "{said}");
+    let file = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    assert!(
+        file("a/robustness.csv")
+            .contains("\"hold, recorded force\",the file's force all along,hold,PID,")
+    );
+    assert!(file("a/robustness.html").contains("hold, recorded force"));
+    let refused = fail(folder.path(), &[&arguments[..], &["--axis", "z"]].concat());
+    assert!(refused.contains("force_z_n"), "{refused}");
+}
+
+#[test]
+fn what_cannot_be_is_refused_with_what_could() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows: String = (0..20)
+        .map(|k| format!("{},{}\n", f64::from(k) * 1e-3, 2e5))
+        .collect();
+    for (name, text) in [
+        ("f.csv", "t_s,force_n\n0,1\n".to_owned()),
+        ("g.csv", format!("t_s,force_x_n\n{rows}")),
+    ] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    for (arguments, words) in [
+        (["--only", "earthquake"], "light cutting"),
+        (["--seeds", "0"], "1..=100"),
+        (["--force", "missing.csv"], "missing.csv"),
+        (["--force", "f.csv"], "force_x_n"),
+        (["--force", "g.csv"], "newtons"),
+    ] {
+        let said = fail(folder.path(), &[&["robustness"], &arguments[..]].concat());
+        assert!(said.contains(words), "{said}");
     }
 }

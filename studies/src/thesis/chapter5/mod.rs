@@ -13,6 +13,8 @@ use quadrant_sim::experiment::metrics::GLITCH_WINDOW;
 use quadrant_sim::experiment::run_configuration::ModelKnowledge;
 use quadrant_sim::report::Section;
 
+use super::Context;
+
 /// Controllers in the order of the chapter.
 const CONTROLLERS: [LawKind; 2] = [LawKind::Pid, LawKind::NPid];
 
@@ -62,6 +64,14 @@ const fn knowledge_name(knowledge: ModelKnowledge) -> &'static str {
         ModelKnowledge::Exact => "simulation (exact model)",
         ModelKnowledge::Identified => "experiment (identified model)",
     }
+}
+
+/// Every controller with every feedforward.
+pub(super) fn sections(
+    context: &Context,
+    advance: &(dyn Fn(f64) + Sync),
+) -> anyhow::Result<Vec<Section>> {
+    Ok(chapter5_sections(context.comparison(advance)?))
 }
 
 /// Tables 5.1 to 5.22 and Figures 5.1 to 5.18; beside PID with each feedforward the best PID alone.

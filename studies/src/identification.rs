@@ -3,22 +3,60 @@
 //! Two pairs of parameters cannot be separated by motion, so each pair is judged as what it shows: the viscous friction and
 //! the linear damping as the total damping `B + A sigma`, and a direction's friction levels with the amplifier's offset.
 
-pub mod command;
-pub mod page;
-
-use indicatif::ProgressBar;
+use clap::Args;
 use quadrant_settings::StageSettings;
 use quadrant_sim::commission::{CommissionError, CommissionSettings, Commissioned, commission};
 use quadrant_sim::machine::SimulatedTestAxis;
+use quadrant_sim::pages::columns;
 use quadrant_sim::plant::{AxisParameters, StageParameters};
+use quadrant_sim::report::{Block, Cell, Section, Table};
 use rayon::prelude::*;
 
+use crate::study::{Study, results};
+
+/// `quadrant-studies identification`.
+#[derive(Clone, Debug, Args)]
+pub struct Identification {
+    /// Commissionings of each axis at each noise level.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..))]
+    seeds: u64,
+}
+
+impl Study for Identification {
+    const NAME: &'static str = "identification";
+    const TITLE: &'static str = "Identification judged by the truth";
+    const SUBTITLE: &'static str =
+        "Axes of the simulated stage, whose truth was hidden from identification";
+
+    /// Commissions every axis at every noise level, each time with a seed of its own, in parallel, and judges the results.
+    fn run(&self, _seed: u64, advance: &(dyn Fn(f64) + Sync)) -> anyhow::Result<Vec<Section>> {
+        let levels = (0..3).flat_map(|axis| NOISE_LEVELS.map(|noise| (axis, noise)));
+        // No two runs share their noise: what is judged is how often the truth lies within the stated deviations.
+        let runs: Vec<(usize, f64, u64)> = levels
+            .zip(0..)
+            .flat_map(|((axis, noise), level)| {
+                (1..=self.seeds).map(move |seed| (axis, noise, level * self.seeds + seed))
+            })
+            .collect();
+        let share = 1.0 / runs.len() as f64;
+        let judgements: Result<Vec<_>, CommissionError> = runs
+            .into_par_iter()
+            .map(|(axis, noise, seed)| {
+                let judgement = judge(axis, noise, seed)?;
+                advance(share);
+                Ok(judgement)
+            })
+            .collect();
+        Ok(results(vec![Block::Table(table(&judgements?))]))
+    }
+}
+
 /// Encoder noise of the runs, over that of the simulated stage.
-pub const NOISE_LEVELS: [f64; 3] = [0.5, 1.0, 2.0];
+const NOISE_LEVELS: [f64; 3] = [0.5, 1.0, 2.0];
 
 /// The parameters that are judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Judged {
+enum Judged {
     Gain,
     /// B + A sigma.
     TotalDamping,
@@ -32,7 +70,7 @@ pub enum Judged {
 }
 
 impl Judged {
-    pub const ALL: [Self; 6] = [
+    const ALL: [Self; 6] = [
         Self::Gain,
         Self::TotalDamping,
         Self::Delay,
@@ -42,7 +80,7 @@ impl Judged {
     ];
 
     /// Its name in tables.
-    pub const fn name(self) -> &'static str {
+    const fn name(self) -> &'static str {
         match self {
             Self::Gain => "A",
             Self::TotalDamping => "B + A sigma",
@@ -54,7 +92,7 @@ impl Judged {
     }
 
     /// The largest error allowed, %.
-    pub const fn limit_percent(self) -> f64 {
+    const fn limit_percent(self) -> f64 {
         match self {
             Self::Gain => 2.0,
             Self::Delay | Self::Coulomb => 3.0,
@@ -66,67 +104,35 @@ impl Judged {
 
 /// One estimate beside the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
-    pub judged: Judged,
-    pub found: f64,
+struct Estimate {
+    judged: Judged,
+    found: f64,
     /// One standard deviation, as stated.
-    pub standard_error: f64,
-    pub truth: f64,
+    standard_error: f64,
+    truth: f64,
 }
 
 impl Estimate {
     /// Its error, %.
-    pub fn error_percent(&self) -> f64 {
+    fn error_percent(&self) -> f64 {
         100.0 * (self.found / self.truth - 1.0)
     }
 
     /// True if the plant's parameter lies within two standard deviations.
-    pub fn is_honest(&self) -> bool {
+    fn is_honest(&self) -> bool {
         (self.found - self.truth).abs() <= 2.0 * self.standard_error
     }
 }
 
 /// One commissioning, judged.
-#[derive(Clone, Debug)]
-pub struct Judgement {
-    /// Axis, 0 to 2.
-    pub axis: usize,
-    /// Encoder noise over that of the simulated stage.
-    pub noise: f64,
-    /// Seed of the noise.
-    pub seed: u64,
-    pub estimates: Vec<Estimate>,
+struct Judgement {
+    estimates: Vec<Estimate>,
     /// RMS error of the predicted hysteresis over the breakaway level, %.
-    pub hysteresis_percent: f64,
-}
-
-/// Commissions every axis at every noise level `seeds` times, each with a seed of its own, in parallel, and judges the results.
-///
-/// # Errors
-/// The first commissioning that fails.
-pub fn validate(seeds: u64, progress: &ProgressBar) -> Result<Vec<Judgement>, CommissionError> {
-    let levels = (0..3).flat_map(|axis| NOISE_LEVELS.map(|noise| (axis, noise)));
-    // No two runs share their noise: what is judged is how often the truth lies within the stated deviations.
-    let runs: Vec<(usize, f64, u64)> = levels
-        .zip(0..)
-        .flat_map(|((axis, noise), level)| {
-            (1..=seeds).map(move |seed| (axis, noise, level * seeds + seed))
-        })
-        .collect();
-    runs.into_par_iter()
-        .map(|(axis, noise, seed)| {
-            let judgement = judge(axis, noise, seed);
-            progress.inc(1);
-            judgement
-        })
-        .collect()
+    hysteresis_percent: f64,
 }
 
 /// Commissions one axis and judges it.
-///
-/// # Errors
-/// A commissioning that fails.
-pub fn judge(axis: usize, noise: f64, seed: u64) -> Result<Judgement, CommissionError> {
+fn judge(axis: usize, noise: f64, seed: u64) -> Result<Judgement, CommissionError> {
     let mut truth = StageParameters::real().axes[axis].clone();
     truth.imperfections.encoder_noise_mm *= noise;
     let base = StageSettings::simulated().axes[axis].clone();
@@ -138,9 +144,6 @@ pub fn judge(axis: usize, noise: f64, seed: u64) -> Result<Judgement, Commission
         &mut |_, _| {},
     )?;
     Ok(Judgement {
-        axis,
-        noise,
-        seed,
         estimates: estimates(&found, &truth),
         hysteresis_percent: 100.0 * found.presliding.0.clone()?.prediction.relative_error,
     })
@@ -202,4 +205,69 @@ fn estimates(found: &Commissioned, truth: &AxisParameters) -> Vec<Estimate> {
         ]);
     }
     estimates
+}
+
+/// Largest and RMS value.
+fn worst_and_rms(values: &[f64]) -> [Cell; 2] {
+    let worst = values
+        .iter()
+        .fold(0.0, |worst: f64, value| worst.max(value.abs()));
+    let square: f64 = values.iter().map(|value| value.powi(2)).sum();
+    [worst, (square / values.len() as f64).sqrt()].map(|value| Cell::number(value, 4))
+}
+
+/// Errors and honesty by parameter, over all runs.
+fn table(judgements: &[Judgement]) -> Table {
+    let mut rows = Judged::ALL.map(|judged| row(judged, judgements)).to_vec();
+    let hysteresis: Vec<f64> = judgements.iter().map(|it| it.hysteresis_percent).collect();
+    let [worst, rms] = worst_and_rms(&hysteresis);
+    rows.push(vec![
+        Cell::text("hysteresis, of Fs"),
+        Cell::number(hysteresis.len() as f64, 0),
+        worst,
+        rms,
+        Cell::Missing,
+        Cell::number(3.0, 0),
+        Cell::Missing,
+    ]);
+    Table {
+        id: "identification".to_owned(),
+        caption: "Identification of the simulated stage against the truth that was hidden from it: x, y and z axes, encoder noise of 0.5, 1 \
+                  and 2 times the stage's"
+            .to_owned(),
+        columns: columns(&[
+            ("Quantity", ""),
+            ("Estimates", ""),
+            ("Worst error", "%"),
+            ("RMS error", "%"),
+            ("Stated deviation, mean", "%"),
+            ("Allowed", "%"),
+            ("Truth within 2 deviations", "%"),
+        ]),
+        rows,
+    }
+}
+
+fn row(judged: Judged, judgements: &[Judgement]) -> Vec<Cell> {
+    let estimates: Vec<&Estimate> = judgements
+        .iter()
+        .flat_map(|judgement| &judgement.estimates)
+        .filter(|estimate| estimate.judged == judged)
+        .collect();
+    let count = estimates.len() as f64;
+    let errors: Vec<f64> = estimates.iter().map(|it| it.error_percent()).collect();
+    let [worst, rms] = worst_and_rms(&errors);
+    let stated = estimates
+        .iter()
+        .map(|it| 100.0 * it.standard_error / it.truth.abs());
+    let honest = estimates.iter().filter(|it| it.is_honest()).count();
+    vec![
+        Cell::text(judged.name()),
+        Cell::number(count, 0),
+        worst,
+        rms,
+        Cell::number(stated.sum::<f64>() / count, 4),
+        Cell::number(judged.limit_percent(), 0),
+        Cell::number(100.0 * honest as f64 / count, 1),
+    ]
 }
