@@ -12,7 +12,7 @@ use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_sim::report::{Block, Cell, Section, Table};
 use rayon::prelude::*;
 
-use crate::study::{Study, results};
+use crate::study::{Advance, Study, results};
 
 /// `quadrant-studies identification`.
 #[derive(Clone, Debug, Args)]
@@ -29,7 +29,7 @@ impl Study for Identification {
         "Axes of the simulated stage, whose truth was hidden from identification";
 
     /// Commissions every axis at every noise level, each time with a seed of its own, in parallel, and judges the results.
-    fn run(&self, _seed: u64, advance: &(dyn Fn(f64) + Sync)) -> anyhow::Result<Vec<Section>> {
+    fn run(&self, _seed: u64, advance: Advance<'_>) -> anyhow::Result<Vec<Section>> {
         let levels = (0..3).flat_map(|axis| NOISE_LEVELS.map(|noise| (axis, noise)));
         // No two runs share their noise: what is judged is how often the truth lies within the stated deviations.
         let runs: Vec<(usize, f64, u64)> = levels

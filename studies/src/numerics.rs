@@ -16,7 +16,7 @@ use quadrant_sim::pages::UM_PER_MM;
 use quadrant_sim::report::{Block, Cell, Column, Section, Table};
 use rayon::prelude::*;
 
-use crate::study::{Study, results};
+use crate::study::{Advance, Study, results};
 
 /// `quadrant-studies numerics`.
 #[derive(Clone, Debug, Args)]
@@ -28,7 +28,7 @@ impl Study for NumberTypes {
     const SUBTITLE: &'static str = "f32 and fixed point against f64 over the whole comparison";
 
     /// Runs the whole comparison in all number types, in parallel.
-    fn run(&self, seed: u64, advance: &(dyn Fn(f64) + Sync)) -> anyhow::Result<Vec<Section>> {
+    fn run(&self, seed: u64, advance: Advance<'_>) -> anyhow::Result<Vec<Section>> {
         let setups = RunConfiguration::both(&identified_settings()?.stage);
         let configurations = Configuration::all();
         let share = 1.0 / configurations.len() as f64;

@@ -10,7 +10,7 @@ use quadrant_sim::pages::UM_PER_MM;
 use quadrant_sim::report::{Block, Cell, Column, Section, Table};
 use rayon::prelude::*;
 
-use crate::study::{Study, results};
+use crate::study::{Advance, Study, results};
 
 /// `quadrant-studies outputs`.
 #[derive(Clone, Debug, Args)]
@@ -22,7 +22,7 @@ impl Study for Outputs {
     const SUBTITLE: &'static str = "16 bits against 12 bits, plain and shaped";
 
     /// Runs PID, and N-PID with combined feedforward, behind every output, in parallel.
-    fn run(&self, seed: u64, advance: &(dyn Fn(f64) + Sync)) -> anyhow::Result<Vec<Section>> {
+    fn run(&self, seed: u64, advance: Advance<'_>) -> anyhow::Result<Vec<Section>> {
         let setup = RunConfiguration::identified(identified_settings()?.stage);
         let runs: Vec<_> = Configuration::EXTREMES
             .into_iter()

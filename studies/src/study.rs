@@ -6,6 +6,9 @@ use quadrant_cli::say;
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::{Block, Page, Section, Table};
 
+/// Receives the share of a whole that was done since its last call, from any thread.
+pub type Advance<'a> = &'a (dyn Fn(f64) + Sync);
+
 /// A study; its fields are its options.
 pub trait Study: Args {
     /// Name of its page's file.
@@ -15,11 +18,11 @@ pub trait Study: Args {
     /// Line below the heading.
     const SUBTITLE: &'static str;
 
-    /// Runs it. `seed` decides the simulated noise; `advance` receives the share of the whole that was done since its last call.
+    /// Runs it. `seed` decides the simulated noise.
     ///
     /// # Errors
     /// Refused options or settings, or a run that fails.
-    fn run(&self, seed: u64, advance: &(dyn Fn(f64) + Sync)) -> anyhow::Result<Vec<Section>>;
+    fn run(&self, seed: u64, advance: Advance<'_>) -> anyhow::Result<Vec<Section>>;
 
     /// True if the tables of a section are shown in the terminal.
     fn shows(&self, _section: &Section) -> bool {

@@ -18,7 +18,7 @@ use rand::{RngCore, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 
-use crate::study::{Study, results};
+use crate::study::{Advance, Study, results};
 
 /// `quadrant-studies wrong-model`, on the x axis.
 #[derive(Clone, Debug, Args)]
@@ -117,7 +117,7 @@ impl Study for WrongModel {
     const TITLE: &'static str = "Feedforward whose model is wrong";
     const SUBTITLE: &'static str = "x axis of the simulated stage under the best PID";
 
-    fn run(&self, seed: u64, advance: &(dyn Fn(f64) + Sync)) -> anyhow::Result<Vec<Section>> {
+    fn run(&self, seed: u64, advance: Advance<'_>) -> anyhow::Result<Vec<Section>> {
         let stage = identified_settings()?.stage;
         let mut settings = stage.axes[0].clone();
         set_best_pid(&mut settings, stage.rate_hz)?;

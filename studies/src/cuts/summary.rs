@@ -6,7 +6,9 @@ use super::{Comparison, Line, WORSE};
 use crate::campaign::{Lines, list_worst};
 
 /// A feedforward: its name, and its part of a line.
-const COMPARED: [(&str, fn(&Line) -> &Comparison); 3] = [
+type Compared = (&'static str, fn(&Line) -> &Comparison);
+
+const COMPARED: [Compared; 3] = [
     ("as commissioned", |line| &line.fixed),
     ("learning", |line| &line.learning),
     ("cancelling", |line| &line.cancelling),

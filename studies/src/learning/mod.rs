@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_sim::report::{Block, Section};
 
-use crate::study::{Study, results};
+use crate::study::{Advance, Study, results};
 
 /// `quadrant-studies learning`, on the x axis.
 #[derive(Clone, Debug, Args)]
@@ -38,7 +38,7 @@ impl Study for Learning {
     const TITLE: &'static str = "Learning on the simulated stage";
     const SUBTITLE: &'static str = "The feedforward that learns: other starts, cuts";
 
-    fn run(&self, seed: u64, advance: &(dyn Fn(f64) + Sync)) -> anyhow::Result<Vec<Section>> {
+    fn run(&self, seed: u64, advance: Advance<'_>) -> anyhow::Result<Vec<Section>> {
         let stage = self.settings.read()?.stage;
         let axis = &stage.axes[0];
         let is_asked = |question| self.only.is_none_or(|only| only == question);

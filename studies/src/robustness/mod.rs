@@ -25,7 +25,7 @@ use quadrant_sim::report::Section;
 use rayon::prelude::*;
 
 use crate::competitor::Feedforward;
-use crate::study::{Study, results};
+use crate::study::{Advance, Study, results};
 pub use scenario::{Scenario, scenarios};
 pub use trial::Task;
 use trial::Trial;
@@ -58,7 +58,7 @@ impl Study for Robustness {
     const TITLE: &'static str = "Robustness on the simulated stage";
     const SUBTITLE: &'static str = "PID and N-PID, with and without friction compensation, on an axis that is no longer what it was";
 
-    fn run(&self, seed: u64, advance: &(dyn Fn(f64) + Sync)) -> anyhow::Result<Vec<Section>> {
+    fn run(&self, seed: u64, advance: Advance<'_>) -> anyhow::Result<Vec<Section>> {
         let mut scenarios = scenarios(self.axis.index(), self.recorded_force()?);
         if let Some(text) = &self.only {
             let names: Vec<String> = scenarios.iter().map(|it| it.name.clone()).collect();
@@ -170,7 +170,7 @@ pub fn usual_competitors(stage: &StageSettings) -> Vec<(String, StageSettings)> 
 ///
 /// # Errors
 /// Settings that are refused, or a motion that does not end.
-pub fn run(request: &Request, advance: &(dyn Fn(f64) + Sync)) -> anyhow::Result<Vec<Outcome>> {
+pub fn run(request: &Request, advance: Advance<'_>) -> anyhow::Result<Vec<Outcome>> {
     let pairs: Vec<_> = request
         .scenarios
         .iter()

@@ -14,6 +14,7 @@ use quadrant_sim::report::{Block, Colour, Figure, Section, Style};
 
 use super::Context;
 use super::numbers::{Number, number};
+use crate::study::Advance;
 
 /// The thesis' numbers. Of 3.16 to 3.21 it lists two for each kind of friction.
 const NUMBERS: [Number; 19] = [
@@ -45,10 +46,7 @@ const SHOWN_VELOCITY_MM_S: f64 = 2.0;
 const COMMISSIONED: f64 = 0.7;
 
 /// Commissions the x axis from nothing known, and cross-checks the result.
-pub(super) fn sections(
-    context: &Context,
-    advance: &(dyn Fn(f64) + Sync),
-) -> anyhow::Result<Vec<Section>> {
+pub(super) fn sections(context: &Context, advance: Advance<'_>) -> anyhow::Result<Vec<Section>> {
     let [truth, ..] = StageParameters::real().axes;
     let mut rig = SimulatedTestAxis::new(0, truth, context.seed);
     let found = commission(

@@ -18,6 +18,7 @@ use quadrant_sim::report::{Block, Cell, Section, Table};
 
 use super::Context;
 use super::numbers::{Number, number};
+use crate::study::Advance;
 
 const PID_NUMBERS: [Number; 9] = [
     ("pid-gains", "Table 4.1"),
@@ -47,10 +48,7 @@ const DRAWS: usize = 2000;
 const STEPS_MM: [f64; 2] = [0.01, 0.1];
 
 /// Examines the settings' PID and nonlinear gain on the settings' model of the x axis.
-pub(super) fn sections(
-    context: &Context,
-    advance: &(dyn Fn(f64) + Sync),
-) -> anyhow::Result<Vec<Section>> {
+pub(super) fn sections(context: &Context, advance: Advance<'_>) -> anyhow::Result<Vec<Section>> {
     let stage = &context.settings.stage;
     let [x, ..] = &stage.axes;
     let plant = x

@@ -12,6 +12,7 @@ use quadrant_sim::report::{Block, Cell, Column, Section, Table};
 
 use super::Context;
 use super::imperfections::{Change, Finding, study};
+use crate::study::Advance;
 
 /// The measures of the best configuration, with the thesis' figure for each, %. It does not say whether its tracking error is a
 /// largest or an RMS value: it is set beside both.
@@ -27,10 +28,7 @@ const STUDY_SEEDS: u64 = 3;
 const COMPARISON_SHARE: f64 = 0.7;
 
 /// The headlines, and what limits ours.
-pub(super) fn sections(
-    context: &Context,
-    advance: &(dyn Fn(f64) + Sync),
-) -> anyhow::Result<Vec<Section>> {
+pub(super) fn sections(context: &Context, advance: Advance<'_>) -> anyhow::Result<Vec<Section>> {
     let comparison = context.comparison(&|done| advance(COMPARISON_SHARE * done))?;
     let [_, identified] = context.setups();
     let findings = study(

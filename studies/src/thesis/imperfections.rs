@@ -14,6 +14,8 @@ use quadrant_sim::machine::{SimulatedTestAxis, TestAxis, approach};
 use quadrant_sim::plant::Imperfections;
 use rayon::prelude::*;
 
+use crate::study::Advance;
+
 /// Elements of the GMS models that are identified: up to the firmware's room. From nine on the search for the
 /// parameters takes minutes or ends without an answer: the record does not determine so many.
 const ELEMENTS: [usize; 3] = [4, 6, FIRMWARE_ELEMENTS];
@@ -188,7 +190,7 @@ pub fn study(
     changes: &[Change],
     seed: u64,
     seeds: u64,
-    advance: &(dyn Fn(f64) + Sync),
+    advance: Advance<'_>,
 ) -> Result<Vec<Finding>, RunError> {
     // The identifications run on one core each, so all at once; the runs of a comparison fill the cores by themselves.
     let changed: Vec<anyhow::Result<RunConfiguration>> = changes

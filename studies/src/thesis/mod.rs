@@ -22,7 +22,7 @@ use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Section;
 use quadrant_sim::settings_file::SettingsFile;
 
-use crate::study::Study;
+use crate::study::{Advance, Study};
 
 /// `quadrant-studies report`.
 #[derive(Clone, Debug, Args)]
@@ -43,7 +43,7 @@ struct Part {
     id: &'static str,
     /// About how long it takes on two cores, s: its share of the progress bar.
     expected_s: f64,
-    run: fn(&Context, &(dyn Fn(f64) + Sync)) -> anyhow::Result<Vec<Section>>,
+    run: fn(&Context, Advance<'_>) -> anyhow::Result<Vec<Section>>,
 }
 
 /// All parts, in the order of the page.
@@ -75,7 +75,7 @@ impl Study for Report {
     const TITLE: &'static str = "The thesis' tables and figures on the simulated stage";
     const SUBTITLE: &'static str = "Under the thesis' numbers, beside its headline figures";
 
-    fn run(&self, seed: u64, advance: &(dyn Fn(f64) + Sync)) -> anyhow::Result<Vec<Section>> {
+    fn run(&self, seed: u64, advance: Advance<'_>) -> anyhow::Result<Vec<Section>> {
         let context = Context {
             seed,
             seeds: self.seeds,
@@ -130,7 +130,7 @@ impl Context {
     }
 
     /// Runs the comparison of chapter 5, and the best PID on the same sines of the first amplitude, unless a part before did.
-    fn comparison(&self, advance: &(dyn Fn(f64) + Sync)) -> anyhow::Result<&Comparison> {
+    fn comparison(&self, advance: Advance<'_>) -> anyhow::Result<&Comparison> {
         if let Some(comparison) = self.comparison.get() {
             return Ok(comparison);
         }

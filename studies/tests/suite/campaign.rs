@@ -62,7 +62,9 @@ fn results_have_a_column_for_each_value_of_their_parts() {
         values[place.unwrap()].parse::<f64>().unwrap()
     };
     assert_eq!(value("seed"), 3.0);
-    assert!(value("learning_um") < value("fixed_um") && value("fixed_um") < value("off_um"));
+    for name in ["fixed_um", "learning_um", "cancelling_um"] {
+        assert!(value(name) < 0.5 * value("off_um"), "{name}");
+    }
     assert!(
         fs::read_to_string(at.join("t/3.csv"))
             .unwrap()

@@ -16,20 +16,25 @@ fn report(folder: &Path, threads: &str, arguments: &[&str]) -> Output {
 #[test]
 fn a_part_is_the_same_to_the_byte_on_another_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
-    let page = |threads| {
-        let made = report(
-            folder.path(),
-            threads,
+    let pages = |threads| {
+        let formats = ["html", "json", "csv"].map(|format| ["--format", format]);
+        let arguments = [
             &["--only", "chapter-4", "--out", "a"],
-        );
+            formats.as_flattened(),
+        ]
+        .concat();
+        let made = report(folder.path(), threads, &arguments);
         assert!(made.status.success(), "{made:?}");
         let shown = String::from_utf8_lossy(&made.stdout);
         assert!(shown.contains("Simulated, not measured"), "{shown}");
-        std::fs::read_to_string(folder.path().join("a/report.html")).unwrap()
+        ["html", "json"].map(|format| {
+            std::fs::read_to_string(folder.path().join(format!("a/report.{format}"))).unwrap()
+        })
     };
-    let text = page("2");
-    assert!(page("1") == text, "a page on one thread differs");
-    assert!(text.contains("quadrant-studies report --only chapter-4 --seed 1 --seeds 10"));
+    let made = pages("2");
+    assert!(pages("1") == made, "a page on one thread differs");
+    let [text, data] = made;
+    assert!(data.contains("quadrant-studies report --only chapter-4 --seed 1 --seeds 10"));
     for label in [
         "Table 4.1",
         "Table 4.2",

@@ -14,6 +14,7 @@ use quadrant_sim::experiment::run_configuration::ModelKnowledge;
 use quadrant_sim::report::Section;
 
 use super::Context;
+use crate::study::Advance;
 
 /// Controllers in the order of the chapter.
 const CONTROLLERS: [LawKind; 2] = [LawKind::Pid, LawKind::NPid];
@@ -67,10 +68,7 @@ const fn knowledge_name(knowledge: ModelKnowledge) -> &'static str {
 }
 
 /// Every controller with every feedforward.
-pub(super) fn sections(
-    context: &Context,
-    advance: &(dyn Fn(f64) + Sync),
-) -> anyhow::Result<Vec<Section>> {
+pub(super) fn sections(context: &Context, advance: Advance<'_>) -> anyhow::Result<Vec<Section>> {
     Ok(chapter5_sections(context.comparison(advance)?))
 }
 
