@@ -90,16 +90,6 @@ impl Judged {
             Self::StribeckVelocity => "Vs, each way",
         }
     }
-
-    /// The largest error allowed, %.
-    const fn limit_percent(self) -> f64 {
-        match self {
-            Self::Gain => 2.0,
-            Self::Delay | Self::Coulomb => 3.0,
-            Self::TotalDamping | Self::Breakaway => 5.0,
-            Self::StribeckVelocity => 20.0,
-        }
-    }
 }
 
 /// One estimate beside the truth.
@@ -227,7 +217,6 @@ fn table(judgements: &[Judgement]) -> Table {
         worst,
         rms,
         Cell::Missing,
-        Cell::number(3.0, 0),
         Cell::Missing,
     ]);
     Table {
@@ -241,7 +230,6 @@ fn table(judgements: &[Judgement]) -> Table {
             ("Worst error", "%"),
             ("RMS error", "%"),
             ("Stated deviation, mean", "%"),
-            ("Allowed", "%"),
             ("Truth within 2 deviations", "%"),
         ]),
         rows,
@@ -267,7 +255,6 @@ fn row(judged: Judged, judgements: &[Judgement]) -> Vec<Cell> {
         worst,
         rms,
         Cell::number(stated.sum::<f64>() / count, 4),
-        Cell::number(judged.limit_percent(), 0),
         Cell::number(100.0 * honest as f64 / count, 1),
     ]
 }

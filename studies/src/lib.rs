@@ -23,3 +23,4 @@ pub mod robustness;
 pub mod study;
 pub mod thesis;
 pub mod wrong_model;
+mod x_alone;

@@ -16,12 +16,10 @@ use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::SafetyState;
-use quadrant_settings::Job;
-use quadrant_settings::{PlanSettings, StageSettings};
-use quadrant_sim::experiment::configuration::ELEMENTS;
+use quadrant_settings::StageSettings;
 use quadrant_sim::experiment::run_configuration::identified_settings;
+use quadrant_sim::machine::Operator;
 use quadrant_sim::machine::law::TickInput;
-use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::Load;
 use quadrant_sim::plant::{AxisParameters, NEWTONS_PER_VOLT, SimulatedAxis, StageParameters};
@@ -32,6 +30,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::campaign::{Campaign, Lines, make_folder};
 use crate::competitor::Feedforward;
+use crate::x_alone::law_of;
 
 /// `quadrant-studies cuts`.
 #[derive(Clone, Debug, Args)]
@@ -242,7 +241,6 @@ impl Case {
         cancels: bool,
         seed: u64,
     ) -> Option<Run> {
-        let mut stage = stage.clone();
         let mut axis = stage.axes[0].clone();
         axis.feedback.law = self.law;
         feedforward.apply(&mut axis);
@@ -251,22 +249,12 @@ impl Case {
             teeth: self.cut.teeth as u8,
             ..CancellingSettings::default()
         });
-        stage.axes = [axis.clone(), axis.clone(), axis];
         let rate_hz = stage.rate_hz;
-        let resolution_mm = stage.axes[0].encoder.resolution_mm;
+        let resolution_mm = axis.encoder.resolution_mm;
         let cycles = RUN_S * self.velocity_mm_s / (std::f64::consts::TAU * self.amplitude_mm);
         let sine =
             HarmonicSettings::with_velocity(self.amplitude_mm, self.velocity_mm_s, cycles, LEAD_S);
-        let plan = PlanSettings {
-            motions: [
-                MotionSettings::Harmonic(sine),
-                MotionSettings::Hold,
-                MotionSettings::Hold,
-            ],
-        };
-        let mut machine = LawMachine::<f32, ELEMENTS>::new(&Job { stage, plan })
-            .ok()?
-            .with_x_alone();
+        let mut machine = law_of(&axis, stage, MotionSettings::Harmonic(sine)).ok()?;
         let load = Load::Milling {
             cut: self.cut,
             component: self.component,

@@ -6,16 +6,14 @@ use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::SafetyState;
-use quadrant_settings::Job;
 use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
-use quadrant_sim::experiment::configuration::ELEMENTS;
-use quadrant_sim::machine::LawMachine;
 use quadrant_sim::machine::law::TickInput;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::Load;
 use quadrant_sim::plant::{AxisParameters, NEWTONS_PER_VOLT, SimulatedAxis, StageParameters};
 
 use crate::competitor::Feedforward;
+use crate::x_alone::law_of;
 
 /// The x axis of the simulated stage.
 pub(super) fn nominal() -> AxisParameters {
@@ -125,17 +123,8 @@ pub(super) fn run(
     phases: &[Phase],
     seed: u64,
 ) -> anyhow::Result<Vec<Trace>> {
-    let stage = StageSettings {
-        axes: [axis.clone(), axis.clone(), axis.clone()],
-        ..stage.clone()
-    };
     let (rate_hz, resolution_mm) = (stage.rate_hz, axis.encoder.resolution_mm);
-    let plan = PlanSettings::default();
-    let mut machine = LawMachine::<f32, ELEMENTS>::new(&Job {
-        stage: stage.clone(),
-        plan,
-    })?
-    .with_x_alone();
+    let mut machine = law_of(axis, stage, MotionSettings::Hold)?;
     let Some(first) = phases.first() else {
         return Ok(Vec::new());
     };
@@ -146,7 +135,7 @@ pub(super) fn run(
         plant.change(phase.truth.clone());
         let mut trace = Trace::default();
         let motions = [phase.motion, MotionSettings::Hold, MotionSettings::Hold];
-        let motion = PlanSettings { motions }.build(&stage)?[AxisName::X].clone();
+        let motion = PlanSettings { motions }.build(stage)?[AxisName::X].clone();
         machine.set_motion(AxisName::X, motion);
         let starting = (START_S * rate_hz) as usize;
         for tick in 0.. {

@@ -5,17 +5,16 @@ use std::f64::consts::TAU;
 use anyhow::{Context, bail};
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant_law::safety::{Fault, SafetyState};
-use quadrant_settings::Job;
-use quadrant_settings::{PlanSettings, StageSettings};
+use quadrant_settings::StageSettings;
 use quadrant_sim::compare::sine::AMPLITUDE_MM;
-use quadrant_sim::experiment::configuration::ELEMENTS;
 use quadrant_sim::experiment::metrics::{Score, largest, rms, score};
 use quadrant_sim::experiment::run::AxisTrace;
+use quadrant_sim::machine::Operator;
 use quadrant_sim::machine::law::TickInput;
-use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::SimulatedAxis;
 
 use super::Scenario;
+use crate::x_alone::law_of;
 
 /// Task of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,27 +120,13 @@ impl Trial<'_> {
         let Scenario {
             truth, load, task, ..
         } = self.scenario;
-        // The others are left out, and like it, so that it waits for none.
         let [axis, ..] = &self.stage.axes;
         let cycles = match axis.feedforward.learning {
             Some(_) => LEARNING_CYCLES + CYCLES,
             None => CYCLES,
         };
-        let mut machine = LawMachine::<f32, ELEMENTS>::new(&Job {
-            stage: StageSettings {
-                axes: [axis.clone(), axis.clone(), axis.clone()],
-                ..self.stage.clone()
-            },
-            plan: PlanSettings {
-                motions: [
-                    task.motion(cycles),
-                    MotionSettings::Hold,
-                    MotionSettings::Hold,
-                ],
-            },
-        })
-        .context("settings refused")?
-        .with_x_alone();
+        let mut machine =
+            law_of(axis, self.stage, task.motion(cycles)).context("settings refused")?;
         let rate_hz = self.stage.rate_hz;
         let resolution_mm = self.stage.axes[0].encoder.resolution_mm;
         let mut plant = SimulatedAxis::new(truth.clone(), rate_hz, self.seed);
