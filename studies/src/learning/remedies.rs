@@ -116,7 +116,7 @@ impl Addition for Observer {
         let position_mm = seen.reference.to_mm(self.resolution_mm) - f64::from(seen.error_mm());
         let (_, velocity, acceleration) =
             self.position.step(position_mm, self.omega, self.period_s);
-        let friction = f64::from(seen.feedforward.level + seen.feedforward.gms);
+        let friction = f64::from(seen.feedforward.level + seen.feedforward.presliding);
         self.late
             .push_back(f64::from(seen.output_v()) + self.added_v - friction);
         let arriving = self.late.pop_front().unwrap_or(0.0);
@@ -184,7 +184,7 @@ impl FedFriction {
                 axis.friction.gms.attraction_v_s,
                 period_s,
             ),
-            gain: axis.feedforward.gains.gms,
+            gain: axis.feedforward.gains.presliding,
             period_s,
             high: [HighPass::default(); 2],
             higher: HighPass::default(),
@@ -223,6 +223,6 @@ impl Addition for FedFriction {
         let power = (self.power[0] - QUIET_MM_S * QUIET_MM_S).max(0.0);
         let shaken = power / (power + HALF_MM_S * HALF_MM_S);
         let averaged = (self.power[1] / self.power[0].max(1e-12)).min(1.0);
-        shaken * (averaged * fed - f64::from(seen.feedforward.gms))
+        shaken * (averaged * fed - f64::from(seen.feedforward.presliding))
     }
 }

@@ -143,7 +143,7 @@ fn the_friction_that_the_axis_has_is_learnt_in_every_number_type() {
 fn a_friction_beyond_the_largest_scale_is_met_with_that() {
     let mut settings = learning();
     let gains = &mut settings.axes[0].feedforward.gains;
-    (gains.gms, gains.level, gains.viscous) = (0.2, 0.2, 0.2);
+    (gains.presliding, gains.level, gains.viscous) = (0.2, 0.2, 0.2);
     let mut axis = Axis::<f32>::on_sine(&settings, 1.0);
     axis.command(Command::Run);
     axis.run(20.0);
