@@ -262,12 +262,21 @@ pub(crate) fn firmware_only(toolchain: Toolchain) -> Result<bool> {
         .chain(LIBRARY_TRIPLES)
         .chain(LAW_TRIPLES)
     {
-        // Its one dependency is the law, without features: as another project has it.
-        report.step(format!("the law in another firmware, for {triple}"), || {
-            let mut check = toolchain.cargo("check");
-            check.args(["--package", "quadrant-law-example", "--profile", "firmware"]);
-            command::run(check.args(["--target", triple]))
-        });
+        // Their one dependency is the law, without features: as another project has it.
+        report.step(
+            format!("the law in another firmware, also in C, for {triple}"),
+            || {
+                let mut check = toolchain.cargo("check");
+                check.args([
+                    "--package",
+                    "quadrant-law-example",
+                    "--package",
+                    "quadrant-law-c",
+                ]);
+                check.args(["--profile", "firmware"]);
+                command::run(check.args(["--target", triple]))
+            },
+        );
     }
     report.step("the page of the bench", || web::build(toolchain).map(drop));
     Ok(report.finish())

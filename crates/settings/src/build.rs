@@ -5,7 +5,7 @@ use super::{
 };
 use crate::cancelling::NominalLoop;
 use quadrant_law::axes::{AxisName, PerAxis};
-use quadrant_law::axis::{Axis, AxisBuilder, Commissioning};
+use quadrant_law::axis::{Axis, AxisBuilder, Commissioning, OutputStage};
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::pid::PidGains;
@@ -206,12 +206,12 @@ impl AxisSettings {
                 // One count more: a slow axis still steps by whole counts.
                 (rounding::ceil(largest_step) as i32 + 1).max(LEAST_STEP_COUNTS),
             ))
-            .amplifier(
-                amplifier.output_limit_v,
-                amplifier.full_scale_v,
-                amplifier.offset_v,
-                amplifier.reversed,
-            )
+            .output(OutputStage {
+                limit_v: amplifier.output_limit_v,
+                full_scale_v: amplifier.full_scale_v,
+                offset_v: amplifier.offset_v,
+                reversed: amplifier.reversed,
+            })
             .feedback(feedback.build(period_s))
             .filters(feedback.build_filters(period_s))
             .feedforward(
