@@ -20,7 +20,7 @@ use quadrant_law::rounding;
 use quadrant_law::safety::monitor::{Following, IndexSpacing, Overspeed, SignalLoss};
 use quadrant_law::safety::oscillation::Oscillation;
 use quadrant_law::safety::overload::Overload;
-use quadrant_law::safety::plausibility::{Plausibility, PlausibilityModel, Words};
+use quadrant_law::safety::plausibility::{OutputScale, Plausibility, PlausibilityModel};
 use quadrant_law::safety::travel::Travel;
 use quadrant_law::safety::{Brake, Operation};
 use quadrant_law::scalar::Scalar;
@@ -266,7 +266,7 @@ impl AxisSettings {
         let (limit_v, resolution_mm) = (self.amplifier.output_limit_v, self.encoder.resolution_mm);
         let amplifier = &self.amplifier;
         let per_volt = DacCode::FULL_SCALE / amplifier.full_scale_v;
-        let words = Words {
+        let words = OutputScale {
             per_volt: if amplifier.reversed {
                 -per_volt
             } else {

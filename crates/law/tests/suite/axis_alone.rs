@@ -277,14 +277,14 @@ fn word_of_pushed_axis(away: i32, injected_word: i16) -> i16 {
         1e6,
     );
     rig.state.prepare_injection(injection);
-    rig.state.offer_voltage(injected_word, false);
+    rig.state.push_injection(injected_word, false);
     rig.inputs.command = Some(Command::StartInjection);
     let mut word = 0;
     for step in 0..400 {
         rig.inputs.set_counts([(away * 10 * step) as u32, 0, 0]);
         let outputs = rig.tick();
         assert!(outputs.enabled, "{:?}", rig.state.safety());
-        rig.state.offer_voltage(injected_word, false);
+        rig.state.push_injection(injected_word, false);
         word = outputs.codes[0].0;
     }
     word
@@ -319,11 +319,11 @@ fn a_voltage_beyond_the_limit_is_shown_as_limited_also_in_open_loop() {
     );
     rig.command(Command::Stop);
     rig.state.prepare_injection(injection);
-    rig.state.offer_voltage(3000, false);
+    rig.state.push_injection(3000, false);
     rig.command(Command::StartInjection);
     let shown = |rig: &Rig<f32>| rig.state.axes()[0].telemetry().limited_by;
     assert_eq!(shown(&rig), LimitedBy::Nothing);
-    rig.state.offer_voltage(30_000, false);
+    rig.state.push_injection(30_000, false);
     assert!(rig.tick().enabled);
     assert_eq!(shown(&rig), LimitedBy::OutputLimit);
 }
@@ -343,7 +343,7 @@ fn settings_that_change_while_a_voltage_is_added_make_no_step() {
         100.0,
     );
     rig.state.prepare_injection(injection);
-    rig.state.offer_voltage(10_000, false);
+    rig.state.push_injection(10_000, false);
     rig.command(Command::StartInjection);
     rig.inputs.set_counts([80, 0, 0]);
     let mut codes = vec![];
@@ -353,7 +353,7 @@ fn settings_that_change_while_a_voltage_is_added_make_no_step() {
             other.axes[0].feedback.pid.kp_v_per_mm *= 3.0;
             rig.exchange(&other);
         }
-        rig.state.offer_voltage(10_000, false);
+        rig.state.push_injection(10_000, false);
         let outputs = rig.tick();
         assert!(outputs.enabled, "{:?}", rig.state.safety());
         codes.push(outputs.codes[0].0);
@@ -566,7 +566,7 @@ fn an_injection_begins_only_with_its_first_value_and_on_an_axis_that_was_commiss
         rig.state
             .prepare_injection(Injection::new(axis, Coupling::Added, 1e-4, travel, 100.0));
         if with_value {
-            rig.state.offer_voltage(10, true);
+            rig.state.push_injection(10, true);
         }
         rig.command(Command::StartInjection);
         assert!(rig.state.safety().is_enabled());

@@ -448,7 +448,7 @@ fn opened() -> Axis<f32> {
     };
     let (injection, _) = learning().injection(&request).expect("within");
     axis.rig.state.prepare_injection(injection);
-    axis.rig.state.offer_voltage(0, false);
+    axis.rig.state.push_injection(0, false);
     axis.command(Command::StartInjection);
     hold_open(&mut axis, 20, false);
     assert_eq!(axis.rig.state.axes()[0].mode(), MotionMode::OpenLoop);
@@ -459,7 +459,7 @@ fn opened() -> Axis<f32> {
 fn hold_open(axis: &mut Axis<f32>, ticks: u32, last: bool) {
     for tick in 1..=ticks {
         if axis.rig.state.wants_voltage() {
-            axis.rig.state.offer_voltage(0, last && tick == ticks);
+            axis.rig.state.push_injection(0, last && tick == ticks);
         }
         axis.tick();
     }
