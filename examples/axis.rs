@@ -1,5 +1,5 @@
 //! One axis under PID against a simulated mass with friction: the largest error, without feedforward and with it.
-use quadrant_law::axis::{Axis, AxisError, AxisState};
+use quadrant_law::axis::{Axis, AxisError, AxisState, OutputStage};
 use quadrant_law::feedforward::{FeedforwardGains, FeedforwardKind};
 use quadrant_law::friction::gms::{Gms, GmsParameters, GmsState};
 use quadrant_law::friction::stribeck::{SlidingTable, StaticFriction, StribeckCurve};
@@ -13,16 +13,16 @@ fn main() -> Result<(), AxisError> {
     let motion = Motion::build(&MotionSettings::Harmonic(sine), SCALE);
     for kind in [FeedforwardKind::None, FeedforwardKind::Combined] {
         let axis = Axis::<f32, 8>::build(SCALE, |axis| {
-            axis.amplifier(10.0, 10.0, 0.0, false)
+            axis.output(OutputStage::limited_to(10.0))
                 .pid(&GAINS, 2.0)
                 .feedforward(kind, &FeedforwardGains::whole(INERTIA), &friction, 0)
         })?;
         let (mut state, mut mass) = (AxisState::default(), Mass::new(&friction));
         let mut largest_mm = 0.0_f32;
         axis.handle_command(&mut state, Command::Run);
-        for tick in 0..150_000 {
+        for _ in 0..150_000 {
             let reading = EncoderReading::of(mass.count());
-            let code = axis.tick(&mut state, &motion, &reading, tick).unwrap();
+            let code = axis.tick(&mut state, &motion, &reading).unwrap();
             mass.step(code.to_volts(10.0));
             largest_mm = largest_mm.max(state.telemetry().error_mm().abs());
         }

@@ -23,6 +23,7 @@ compile_error!("choose one board: `board-mps2` or `board-nucleo-f446re`, not bot
 
 pub(crate) mod crash_record;
 mod fault;
+mod record;
 pub(crate) mod stack;
 pub(crate) mod start_record;
 

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::format::{FORMAT, Head, RecordHead};
 use super::provenance::Provenance;
 use quadrant_settings::parts::{PARTS, part_below_axis, part_of};
-use quadrant_settings::path::{ANY_AXIS, Path, below_axis, of_any_axis, of_axis};
+use quadrant_settings::path::{ANY_AXIS, Path, below_axis, of_any_axis, of_axis, present_name};
 use quadrant_settings::tree::{TreeError, is_leaf, leaves};
 use quadrant_settings::value::{KIND_PART, take_bytes};
 use quadrant_settings::{SettingsError, StageSettings};
@@ -157,6 +157,20 @@ fn decode_over(
     Ok(provenance)
 }
 
+/// The path of a record under its present name.
+fn present_path(stored: &Path) -> Path {
+    let below = stored.strip_prefix(ANY_AXIS).map(present_name);
+    below
+        .and_then(of_any_axis)
+        .unwrap_or_else(|| stored.clone())
+}
+
+/// True if a record is about this path, under whichever name.
+fn is_about(stored: &str, path: &str) -> bool {
+    let below = stored.strip_prefix(ANY_AXIS).map(present_name);
+    stored == path || below.is_some() && below == path.strip_prefix(ANY_AXIS)
+}
+
 /// Takes one record over; false if its path is unknown.
 fn take_record(
     record: &Records<'_>,
@@ -176,8 +190,9 @@ fn take_record(
         }
         return Ok(true);
     }
+    let present = present_path(&record.path);
     for (index, value) in values.iter().enumerate() {
-        let path = of_axis(&record.path, index);
+        let path = of_axis(&present, index);
         if !is_leaf(&path) {
             return Ok(false);
         }
@@ -210,7 +225,7 @@ fn report_missing(
         let mut records = Records::new(records);
         let mut values = [None; 3];
         while records.next(&mut values)? {
-            if records.path == path && (records.kind == KIND_PART) == is_part {
+            if is_about(&records.path, path) && (records.kind == KIND_PART) == is_part {
                 return Ok(Some(records.axes));
             }
         }

@@ -66,7 +66,7 @@ pub fn with_wrong_model(settings: &AxisSettings, wrong: Wrong, seed: u64) -> Axi
     match wrong {
         Wrong::NoFeedforward => axis.feedforward.kind = FeedforwardKind::None,
         Wrong::Force(factor) => {
-            axis.feedforward.gains.gms *= factor;
+            axis.feedforward.gains.presliding *= factor;
             axis.feedforward.gains.viscous *= factor;
         }
         Wrong::Range(factor) => {

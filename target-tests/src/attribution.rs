@@ -1,6 +1,6 @@
 //! Attribution of an instruction to a stage, from the image's debug information.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use addr2line::Loader;
 use anyhow::{Result, anyhow};
@@ -33,6 +33,15 @@ impl Attribution {
         let stage = self.look_up(address)?;
         self.known.insert(address, stage);
         Ok(stage)
+    }
+
+    /// The functions of all instructions that were looked up, inlined ones too.
+    pub(crate) fn seen_functions(&self) -> Result<BTreeSet<String>> {
+        let mut functions = BTreeSet::new();
+        for address in self.known.keys() {
+            functions.extend(self.functions(*address)?);
+        }
+        Ok(functions)
     }
 
     fn look_up(&self, address: u32) -> Result<Option<&'static str>> {

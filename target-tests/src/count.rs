@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::kinds::{Kinds, USUAL, emulated, usual};
 use crate::trace::Tick;
+use crate::walk;
 use xtask::golden::{self, Golden};
 use xtask::image::Scalar;
 use xtask::toolchain::Toolchain;
@@ -47,6 +48,7 @@ const GOLDEN: Golden = Golden {
 pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: bool) -> Result<()> {
     let image = emulated(toolchain, scalar)?;
     let kinds = Kinds::traced(&image, ticks)?;
+    walk::check(kinds.functions())?;
     println!("{}: instructions per control tick", image.target);
     println!(
         "  {:<20} {:>6} {:>9} {:>6} {:>6}",

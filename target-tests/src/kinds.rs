@@ -1,5 +1,6 @@
 //! The ticks whose cost is looked at, by kind: those of homed axes on recorded inputs, and those of a machine with a host.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use anyhow::{Context, Result, ensure};
@@ -28,6 +29,8 @@ pub(crate) struct Kinds {
     ticks: Vec<Tick>,
     /// The indices of each kind's, the usual kind first.
     kinds: Vec<(&'static str, Vec<usize>)>,
+    /// Functions that were executed in a tick on recorded inputs, inlined ones too.
+    functions: BTreeSet<String>,
 }
 
 impl Kinds {
@@ -36,18 +39,27 @@ impl Kinds {
         let recorded = Recorded::with_usual(ticks);
         let mut rehearsal = rehearse(image, reference_model::job(), recorded.fault + 1)?;
         recorded.mark(&mut rehearsal.inputs);
-        let mut all = trace(image, &rehearsal, 0)?;
+        let (mut all, functions) = trace(image, &rehearsal, 0)?;
         let mut kinds = recorded.kinds();
         for (name, hosted) in hosted::traced(image)? {
             kinds.push((name, (all.len()..all.len() + hosted.len()).collect()));
             all.extend(hosted);
         }
-        Ok(Self { ticks: all, kinds })
+        Ok(Self {
+            ticks: all,
+            kinds,
+            functions,
+        })
     }
 
     /// All ticks, in the order of execution.
     pub(crate) fn all(&self) -> &[Tick] {
         &self.ticks
+    }
+
+    /// The functions that were executed on recorded inputs, inlined ones too.
+    pub(crate) fn functions(&self) -> &BTreeSet<String> {
+        &self.functions
     }
 
     /// Each kind with its name, the usual one first.
@@ -152,11 +164,11 @@ fn rehearse(image: &Image, job: Job, ticks: u32) -> Result<Rehearsal> {
 /// Runs the image on a job with homed axes; as many usual ticks.
 pub(crate) fn usual(image: &Image, job: Job, ticks: u32) -> Result<Vec<Tick>> {
     let rehearsal = rehearse(image, job, SETTLED + ticks)?;
-    trace(image, &rehearsal, SETTLED)
+    Ok(trace(image, &rehearsal, SETTLED)?.0)
 }
 
-/// Runs the image on recorded inputs; the ticks from one on.
-fn trace(image: &Image, rehearsal: &Rehearsal, from: u32) -> Result<Vec<Tick>> {
+/// Runs the image on recorded inputs; the ticks from one on, and their functions.
+fn trace(image: &Image, rehearsal: &Rehearsal, from: u32) -> Result<(Vec<Tick>, BTreeSet<String>)> {
     let Rehearsal { job, inputs } = rehearsal;
     let trace = Trace::of(image)?;
     let memory = Memory::create()?;
@@ -170,7 +182,7 @@ fn trace(image: &Image, rehearsal: &Rehearsal, from: u32) -> Result<Vec<Tick>> {
             tracer.trace_from_write(u32::try_from(BASE + output)?)?;
         }
     }
-    let closed = trace.read(image, lines)?;
+    let (closed, functions) = trace.read_with_functions(image, lines)?;
     emulator.wait()?;
     ensure!(
         closed.len() + from as usize == inputs.len(),
@@ -179,5 +191,5 @@ fn trace(image: &Image, rehearsal: &Rehearsal, from: u32) -> Result<Vec<Tick>> {
         inputs.len() - from as usize
     );
     closed.iter().try_for_each(|tick| tick.whole().map(drop))?;
-    Ok(closed)
+    Ok((closed, functions))
 }

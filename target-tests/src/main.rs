@@ -27,6 +27,7 @@ mod saturation;
 mod stages;
 mod trace;
 mod traced_run;
+mod walk;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -53,6 +53,15 @@ impl Trace {
 
     /// Reads a trace to its end: the control ticks, the first being number 1.
     pub(crate) fn read(&self, image: &Image, trace: impl Read) -> Result<Vec<Tick>> {
+        Ok(self.read_with_functions(image, trace)?.0)
+    }
+
+    /// The same, and the functions that were executed, inlined or not.
+    pub(crate) fn read_with_functions(
+        &self,
+        image: &Image,
+        trace: impl Read,
+    ) -> Result<(Vec<Tick>, BTreeSet<String>)> {
         let Self {
             root,
             listing,
@@ -202,10 +211,10 @@ struct OpenTick {
 
 impl Tally<'_> {
     /// Reads a trace to its end.
-    fn read(mut self, trace: impl Read) -> Result<Vec<Tick>> {
+    fn read(mut self, trace: impl Read) -> Result<(Vec<Tick>, BTreeSet<String>)> {
         for_each_instruction(trace, |address| self.executed(address))?;
         self.close(Some("the trace ends within it"));
-        Ok(self.closed)
+        Ok((self.closed, self.attribution.seen_functions()?))
     }
 
     fn executed(&mut self, address: u32) -> Result<()> {

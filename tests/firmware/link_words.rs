@@ -3,8 +3,9 @@
 use quadrant::link::frame::{DecodeError, EncodeError};
 use quadrant::link::message::{
     AxisName, AxisSet, AxisSignal, BLOCK_WORDS, Body, CaptureRequest, Channel, Event,
-    InjectRequest, LearningState, MachineState, OscillationKind, Plan, Reply, SettingsRequest,
-    StageSignal, Status, StreamRequest, TelemetryBlock, TelemetryRequest, Voltages, Words, text,
+    InjectRequest, LearningState, MachineState, OscillationKind, Plan, Reply, SampleWords,
+    SettingsRequest, StageSignal, Status, StreamRequest, TelemetryBlock, TelemetryRequest,
+    Voltages, text,
 };
 use quadrant_fault_bench::tasks::Tasks;
 
@@ -150,7 +151,7 @@ fn blocks_count_what_they_hold() {
     let voltages = Voltages::new([7, -8, 9].into_iter());
     assert_eq!((voltages.len(), voltages.is_empty()), (3, false));
     assert!(Voltages::default().is_empty());
-    let mut words = Words::new();
+    let mut words = SampleWords::new();
     assert!(words.is_empty() && words.extend([1, 2].into_iter()));
     assert_eq!((words.len(), words.is_empty()), (2, false));
 }
@@ -255,7 +256,7 @@ fn a_text_that_is_too_long_ends_between_two_characters() {
 
 #[test]
 fn a_block_gives_its_samples_with_their_numbers_and_takes_no_more_than_fit() {
-    let mut words = Words::new();
+    let mut words = SampleWords::new();
     assert!(words.extend(1..8));
     let block = TelemetryBlock {
         sequence: 40,

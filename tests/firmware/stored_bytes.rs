@@ -322,6 +322,13 @@ fn a_set_of_the_first_release_is_read() {
         lines += 1;
     }
     assert!(lines > 150, "{lines}");
+    // It is stored under a former name.
+    assert!(
+        !findings
+            .iter()
+            .any(|finding| finding.contains("presliding")),
+        "{findings:?}"
+    );
     let unknown = findings
         .iter()
         .filter(|finding| finding.starts_with("Unknown"));

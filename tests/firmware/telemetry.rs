@@ -88,7 +88,7 @@ fn every_channel_shows_its_term<S: Scalar>() {
             (AxisSignal::Derivative, volts(term.feedback.derivative)),
             (AxisSignal::Level, volts(term.feedforward.level)),
             (AxisSignal::Viscous, volts(term.feedforward.viscous)),
-            (AxisSignal::Gms, volts(term.feedforward.gms)),
+            (AxisSignal::Presliding, volts(term.feedforward.presliding)),
             (AxisSignal::Inertia, volts(term.feedforward.inertia)),
             (AxisSignal::BumplessOffset, volts(term.bumpless_offset)),
             (AxisSignal::Output, volts(term.output)),

@@ -16,6 +16,8 @@ pub const INSTRUCTIONS: &str = "target-tests/golden/instructions.toml";
 pub const CYCLES: &str = "target-tests/golden/cycles.toml";
 /// File of the jitter of the output.
 pub const JITTER: &str = "target-tests/golden/jitter.toml";
+/// File of the packages' lines.
+pub const LINES: &str = "xtask/golden/lines.toml";
 /// File of the images' sizes.
 pub const SIZES: &str = "xtask/golden/sizes.toml";
 

@@ -6,6 +6,7 @@ mod documented;
 mod figures;
 mod frames;
 mod layout;
+mod lines;
 mod modules;
 mod peers;
 mod setup;
@@ -49,6 +50,12 @@ enum Verb {
     Build(TargetArgs),
     /// Check where an image lies in the memories, and its sizes against the committed ones
     Sizes(SizeArgs),
+    /// Count the lines of Rust in each package, against the committed figures
+    Lines {
+        /// Write the figures to the file with which later runs are compared
+        #[arg(long)]
+        overwrite_expected: bool,
+    },
     /// Prove from the linked image that the control tick cannot panic
     ProveNoPanic(TargetArgs),
     /// Play a session through the console, on the simulated machine and on the emulated image
@@ -179,6 +186,7 @@ fn run(cli: Cli) -> Result<bool> {
             }
             layout::check(&image, args.overwrite_expected)?;
         }
+        Verb::Lines { overwrite_expected } => lines::run(overwrite_expected)?,
         Verb::ProveNoPanic(args) => prove::run(toolchain()?, args.into())?,
         Verb::Transcript { overwrite_expected } => {
             transcript::run(toolchain()?, overwrite_expected)?

@@ -13,7 +13,7 @@ use xtask::image::{self, LAW_TRIPLES, LIBRARY_TRIPLES, TRIPLES, Target};
 use xtask::toolchain::{self, Choice, Toolchain};
 use xtask::{command, prove};
 
-use crate::{documented, figures, layout, setup, transcript, web};
+use crate::{documented, figures, layout, lines, setup, transcript, web};
 
 /// Settings that a commissioning left, and seconds that the firmware runs on them.
 const COMMISSIONED: &str = "host-sim/data/identified-stage.toml";
@@ -146,6 +146,7 @@ fn host(report: &mut Report) -> Result<()> {
     report.step("format", || {
         command::run(cargo().args(["fmt", "--all", "--check"]))
     });
+    report.step("lines by package", || lines::run(false));
     report.step("host tests", || {
         // Setup has installed the browser: the tests that open pages in it must not skip.
         command::run(
@@ -262,12 +263,21 @@ pub(crate) fn firmware_only(toolchain: Toolchain) -> Result<bool> {
         .chain(LIBRARY_TRIPLES)
         .chain(LAW_TRIPLES)
     {
-        // Its one dependency is the law, without features: as another project has it.
-        report.step(format!("the law in another firmware, for {triple}"), || {
-            let mut check = toolchain.cargo("check");
-            check.args(["--package", "quadrant-law-example", "--profile", "firmware"]);
-            command::run(check.args(["--target", triple]))
-        });
+        // Their one dependency is the law, without features: as another project has it.
+        report.step(
+            format!("the law in another firmware, also in C, for {triple}"),
+            || {
+                let mut check = toolchain.cargo("check");
+                check.args([
+                    "--package",
+                    "quadrant-law-example",
+                    "--package",
+                    "quadrant-law-c",
+                ]);
+                check.args(["--profile", "firmware"]);
+                command::run(check.args(["--target", triple]))
+            },
+        );
     }
     report.step("the page of the bench", || web::build(toolchain).map(drop));
     Ok(report.finish())

@@ -6,6 +6,7 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand, ValueEnum};
 use quadrant::link::message::Channel;
 use quadrant_sim::machine::{Travel, simulated_io};
+use strum::IntoStaticStr;
 
 use crate::commission::Request;
 use crate::plane::PlaneName;
@@ -14,7 +15,8 @@ use quadrant_cli::axis::Axis;
 use quadrant_cli::output::Output;
 
 /// One thing to ask of the machine.
-#[derive(Clone, Debug, Subcommand)]
+#[derive(Clone, Debug, Subcommand, IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 pub(super) enum Command {
     /// Say who the machine is: firmware, board, control rate.
     Hello,
@@ -203,6 +205,7 @@ pub(super) enum Command {
     Flash(FlashOptions),
     /// Take commands from standard input, one a line; `#` begins a comment. The same as no command.
     #[command(name = "-")]
+    #[strum(serialize = "-")]
     Script,
 }
 
@@ -477,54 +480,7 @@ fn input_parser() -> PossibleValuesParser {
 
 impl Command {
     /// Returns its name, for `--json` and messages.
-    pub(super) const fn name(&self) -> &'static str {
-        match self {
-            Self::Hello => "hello",
-            Self::Status => "status",
-            Self::Inputs { .. } => "inputs",
-            Self::Fault => "fault",
-            Self::Reset => "reset",
-            Self::Enable => "enable",
-            Self::Disable => "disable",
-            Self::Stop => "stop",
-            Self::Home { .. } => "home",
-            Self::Move { .. } => "move",
-            Self::Jog { .. } => "jog",
-            Self::Spindle { .. } => "spindle",
-            Self::Run => "run",
-            Self::Plan { .. } => "plan",
-            Self::Circle(_) => "circle",
-            Self::Stream(_) => "stream",
-            Self::Get { .. } => "get",
-            Self::Set { .. } => "set",
-            Self::List { .. } => "list",
-            Self::Diff { .. } => "diff",
-            Self::Adopt { .. } => "adopt",
-            Self::Dump { .. } => "dump",
-            Self::Load { .. } => "load",
-            Self::Apply => "apply",
-            Self::Undo => "undo",
-            Self::Revert => "revert",
-            Self::Defaults => "defaults",
-            Self::Store { .. } => "store",
-            Self::Provenance => "provenance",
-            Self::Channels { .. } => "channels",
-            Self::Ports => "ports",
-            Self::Record(_) => "record",
-            Self::Capture(_) => "capture",
-            Self::Scope(_) => "scope",
-            Self::Watch(_) => "watch",
-            Self::Events { .. } => "events",
-            Self::Log(_) => "log",
-            Self::Press { .. } => "press",
-            Self::Release { .. } => "release",
-            Self::PowerCycle => "power-cycle",
-            Self::Wait { .. } => "wait",
-            Self::Identify(_) => "identify",
-            Self::Commission(_) => "commission",
-            Self::Reboot => "reboot",
-            Self::Flash(_) => "flash",
-            Self::Script => "-",
-        }
+    pub(super) fn name(&self) -> &'static str {
+        self.into()
     }
 }

@@ -504,7 +504,7 @@ fn inputs_are_seen_and_what_they_prevent() {
 }
 
 /// An x axis whose settings have 0.7 times its friction, and learns on a sine.
-const TOO_LITTLE_FRICTION: &str = "set x/feedforward/gains/gms 0.7\nset x/feedforward/gains/level 0.7\n\
+const TOO_LITTLE_FRICTION: &str = "set x/feedforward/gains/presliding 0.7\nset x/feedforward/gains/level 0.7\n\
      set x/feedforward/gains/viscous 0.7\nset x/feedforward/learning present\napply\n";
 
 #[test]
@@ -520,7 +520,7 @@ fn what_an_axis_has_learnt_is_shown_reported_and_kept() {
         &format!(
             "load {stage}\n{TOO_LITTLE_FRICTION}enable\n\
              circle --radius-mm 5 --feed-mm-min 600 --turns 8\nrun\nwait rest\nstatus\nevents\n\
-             adopt x\nadopt x\napply\nstatus\nget x/feedforward/gains/gms\n"
+             adopt x\nadopt x\napply\nstatus\nget x/feedforward/gains/presliding\n"
         ),
     );
     let results = results(&said);

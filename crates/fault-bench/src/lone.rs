@@ -93,9 +93,7 @@ impl<S: Scalar> Lone<S> {
             self.axis.handle_command(&mut self.state, command);
         }
         if self.fault.is_none() {
-            let code = self
-                .axis
-                .tick(&mut self.state, &self.motion, &reading, self.ticks);
+            let code = self.axis.tick(&mut self.state, &self.motion, &reading);
             match code {
                 Ok(code) => self.output_v = code.to_volts(self.full_scale_v),
                 Err(fault) => (self.fault, self.output_v) = (Some(fault), 0.0),

@@ -118,7 +118,7 @@ pub struct FeedforwardGains {
     /// Share of `sigma v`, 0..=2.
     pub viscous: f64,
     /// Share of the pre-sliding model's force, whichever model acts, 0..=2.
-    pub gms: f64,
+    pub presliding: f64,
     /// Inertia, V s^2/mm: 1 / A for the whole of it, 0 for none.
     pub inertia_v_s2_per_mm: f64,
 }
@@ -129,7 +129,7 @@ impl FeedforwardGains {
         Self {
             level: 1.0,
             viscous: 1.0,
-            gms: 1.0,
+            presliding: 1.0,
             inertia_v_s2_per_mm,
         }
     }
@@ -154,7 +154,7 @@ pub struct FeedforwardTerms<S> {
     /// Viscous friction, `sigma v`.
     pub viscous: S,
     /// The pre-sliding model: the GMS elements, smoothed or not, or the bristles.
-    pub gms: S,
+    pub presliding: S,
     /// Inertia, `a / A`.
     pub inertia: S,
 }
@@ -163,19 +163,19 @@ impl<S: Scalar> FeedforwardTerms<S> {
     /// The sum of all terms, V.
     #[inline(always)]
     pub fn total(&self) -> S {
-        self.level + self.viscous + self.gms + self.inertia
+        self.level + self.viscous + self.presliding + self.inertia
     }
 
     /// The friction, V.
     #[inline(always)]
     pub fn friction(&self) -> S {
-        self.level + self.viscous + self.gms
+        self.level + self.viscous + self.presliding
     }
 
     /// Scales the friction but for its viscous part by a [`Quantity::Multiplier`].
     #[inline(always)]
     pub(crate) fn gate_friction(&mut self, gate: S) {
-        for term in [&mut self.level, &mut self.gms] {
+        for term in [&mut self.level, &mut self.presliding] {
             *term = term.times(gate, Quantity::Multiplier);
         }
     }
@@ -183,7 +183,7 @@ impl<S: Scalar> FeedforwardTerms<S> {
     /// Scales the friction by a [`Quantity::Multiplier`].
     #[inline(always)]
     pub(crate) fn scale_friction(&mut self, scale: S) {
-        for term in [&mut self.level, &mut self.viscous, &mut self.gms] {
+        for term in [&mut self.level, &mut self.viscous, &mut self.presliding] {
             *term = term.times(scale, Quantity::Multiplier);
         }
     }
@@ -260,9 +260,9 @@ impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
 pub struct Feedforward<S: Scalar, const N: usize> {
     coulomb_gain: S::Gain,
     /// Zero where the kind has no pre-sliding model, or no viscous friction.
-    gms_gain: S::Gain,
-    /// One over `gms_gain`, at most one over [`LEAST_GAIN`].
-    per_gms_gain: S::Gain,
+    presliding_gain: S::Gain,
+    /// One over `presliding_gain`, at most one over [`LEAST_GAIN`].
+    per_presliding_gain: S::Gain,
     /// Largest friction before sliding, V.
     most: S,
     viscous: PerDirection<S::Gain>,
@@ -288,8 +288,8 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         Self {
             presliding: Presliding::None,
             coulomb_gain: S::Gain::default(),
-            gms_gain: S::Gain::default(),
-            per_gms_gain: S::Gain::default(),
+            presliding_gain: S::Gain::default(),
+            per_presliding_gain: S::Gain::default(),
             most: S::ZERO,
             viscous: PerDirection::default(),
             inertia: S::Gain::default(),
@@ -299,7 +299,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
     /// Feeds nothing forward. The tables stay: to clear them would take as long as to fill them.
     pub(crate) fn switch_off(&mut self) {
         self.coulomb_gain = S::Gain::default();
-        self.gms_gain = S::Gain::default();
+        self.presliding_gain = S::Gain::default();
         self.viscous = PerDirection::default();
         self.inertia = S::Gain::default();
     }
@@ -316,8 +316,8 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         let share = |value| S::gain(value, Quantity::Voltage, Quantity::Voltage);
         let acts = |does: bool| if does { 1.0 } else { 0.0 };
         self.coulomb_gain = share(gains.level);
-        self.gms_gain = share(acts(kind.has_presliding()) * gains.gms);
-        self.per_gms_gain = share(1.0 / gains.gms.max(LEAST_GAIN));
+        self.presliding_gain = share(acts(kind.has_presliding()) * gains.presliding);
+        self.per_presliding_gain = share(1.0 / gains.presliding.max(LEAST_GAIN));
         let levels = [&friction.sliding.positive, &friction.sliding.negative]
             .map(|model| model.curve.breakaway_v.max(model.curve.coulomb_v));
         self.most = S::quantise(levels[0].max(levels[1]), Quantity::Voltage);
@@ -371,11 +371,11 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
     #[cold]
     #[inline(never)]
     pub(crate) fn take_over(&self, state: &mut FeedforwardState<S, N>, voltage: S) -> S {
-        if self.gms_gain == S::Gain::default() {
+        if self.presliding_gain == S::Gain::default() {
             return S::ZERO;
         }
         let force = state.force();
-        let change = (force + voltage.scale(self.per_gms_gain)).within(self.most) - force;
+        let change = (force + voltage.scale(self.per_presliding_gain)).within(self.most) - force;
         match &self.presliding {
             Presliding::None | Presliding::Static(_) => {}
             Presliding::Gms(GmsOnSurface { elements, .. })
@@ -387,7 +387,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
                 state.memory.as_bristles(|bristles| bristles.load(change));
             }
         }
-        change.scale(self.gms_gain)
+        change.scale(self.presliding_gain)
     }
 
     /// Advances by one control period.
@@ -405,12 +405,12 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
             Presliding::Breakaway(model) => (model, *model.breakaway.of(direction)),
             _ => {
                 cold_path();
-                let (level, gms) = self.step_other(state, reference);
+                let (level, presliding) = self.step_other(state, reference);
                 let inertia = reference.acceleration.scale(self.inertia);
                 return FeedforwardTerms {
                     level,
                     viscous,
-                    gms,
+                    presliding,
                     inertia,
                 };
             }
@@ -420,7 +420,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         FeedforwardTerms {
             level: S::ZERO,
             viscous,
-            gms: force.scale(self.gms_gain),
+            presliding: force.scale(self.presliding_gain),
             inertia: reference.acceleration.scale(self.inertia),
         }
     }
@@ -454,7 +454,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
             // None has no friction; the elements of the others are stepped above.
             Presliding::None | Presliding::Gms(_) | Presliding::Breakaway(_) => S::ZERO,
         };
-        (S::ZERO, force.scale(self.gms_gain))
+        (S::ZERO, force.scale(self.presliding_gain))
     }
 
     /// The static model's level in the sense of the velocity, V; none at rest.

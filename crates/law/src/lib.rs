@@ -37,7 +37,7 @@
 //! repository is the same in a firmware.
 //!
 //! ```
-//! use quadrant_law::axis::{Axis, AxisState};
+//! use quadrant_law::axis::{Axis, AxisState, OutputStage};
 //! use quadrant_law::control::pid::PidGains;
 //! use quadrant_law::encoder::EncoderReading;
 //! use quadrant_law::feedforward::{FeedforwardGains, FeedforwardKind};
@@ -51,14 +51,14 @@
 //! let friction = FrictionSettings::new(sliding, gms);
 //! // Counts of 0.5 um, 10 000 ticks a second.
 //! let axis = Axis::<f32, 8>::build(MotionScale::new(0.5e-3, 1e4), |axis| {
-//!     axis.amplifier(9.0, 10.0, 0.0, false)
+//!     axis.output(OutputStage::limited_to(9.0))
 //!         .pid(&gains, 2.0)
 //!         .feedforward(FeedforwardKind::Combined, &FeedforwardGains::whole(14.4e-6), &friction, 12)
 //! })?;
 //! let mut state = AxisState::default();
-//! axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(0), 0).unwrap();
+//! axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(0)).unwrap();
 //! // Pushed one count away, the axis pushes back.
-//! let code = axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(1), 1).unwrap();
+//! let code = axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(1)).unwrap();
 //! assert!(code.to_volts(10.0) < 0.0);
 //! # Ok::<(), quadrant_law::axis::AxisError>(())
 //! ```

@@ -263,7 +263,7 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
 
     /// Gives the injection its next value, in the converter's words; call it when [`StageState::wants_voltage`]. `last`:
     /// it ends with this one.
-    pub fn offer_voltage(&mut self, word: i16, last: bool) {
+    pub fn push_injection(&mut self, word: i16, last: bool) {
         self.offer_value(InjectedValue { word, last });
     }
 

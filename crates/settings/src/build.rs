@@ -5,7 +5,7 @@ use super::{
 };
 use crate::cancelling::NominalLoop;
 use quadrant_law::axes::{AxisName, PerAxis};
-use quadrant_law::axis::{Axis, AxisBuilder, Commissioning};
+use quadrant_law::axis::{Axis, AxisBuilder, Commissioning, OutputStage};
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::pid::PidGains;
@@ -20,7 +20,7 @@ use quadrant_law::rounding;
 use quadrant_law::safety::monitor::{Following, IndexSpacing, Overspeed, SignalLoss};
 use quadrant_law::safety::oscillation::Oscillation;
 use quadrant_law::safety::overload::Overload;
-use quadrant_law::safety::plausibility::{Plausibility, PlausibilityModel, Words};
+use quadrant_law::safety::plausibility::{OutputScale, Plausibility, PlausibilityModel};
 use quadrant_law::safety::travel::Travel;
 use quadrant_law::safety::{Brake, Operation};
 use quadrant_law::scalar::Scalar;
@@ -206,12 +206,12 @@ impl AxisSettings {
                 // One count more: a slow axis still steps by whole counts.
                 (rounding::ceil(largest_step) as i32 + 1).max(LEAST_STEP_COUNTS),
             ))
-            .amplifier(
-                amplifier.output_limit_v,
-                amplifier.full_scale_v,
-                amplifier.offset_v,
-                amplifier.reversed,
-            )
+            .output(OutputStage {
+                limit_v: amplifier.output_limit_v,
+                full_scale_v: amplifier.full_scale_v,
+                offset_v: amplifier.offset_v,
+                reversed: amplifier.reversed,
+            })
             .feedback(feedback.build(period_s))
             .filters(feedback.build_filters(period_s))
             .feedforward(
@@ -266,7 +266,7 @@ impl AxisSettings {
         let (limit_v, resolution_mm) = (self.amplifier.output_limit_v, self.encoder.resolution_mm);
         let amplifier = &self.amplifier;
         let per_volt = DacCode::FULL_SCALE / amplifier.full_scale_v;
-        let words = Words {
+        let words = OutputScale {
             per_volt: if amplifier.reversed {
                 -per_volt
             } else {

@@ -221,7 +221,7 @@ impl Default for FeedforwardSettings {
             gains: FeedforwardGains {
                 level: default!("feedforward.gains.level"),
                 viscous: default!("feedforward.gains.viscous"),
-                gms: default!("feedforward.gains.gms"),
+                presliding: default!("feedforward.gains.presliding"),
                 inertia_v_s2_per_mm: default!("feedforward.gains.inertia_v_s2_per_mm"),
             },
             preview_s: default!("feedforward.preview_s"),

@@ -19,6 +19,16 @@ const AXES: &str = "/axes/";
 /// The axes, as letters and as numbers.
 const NAMES: [[&str; 2]; 3] = [["x", "0"], ["y", "1"], ["z", "2"]];
 
+/// Paths below an axis under their former names, and what they are now: what is stored or kept in a file stays readable.
+pub const RENAMED: [(&str, &str); 1] =
+    [("/feedforward/gains/gms", "/feedforward/gains/presliding")];
+
+/// The present name of a path below an axis, which may be given under a former one.
+pub fn present_name(below: &str) -> &str {
+    let renamed = RENAMED.iter().find(|(former, _)| *former == below);
+    renamed.map_or(below, |(_, present)| present)
+}
+
 /// The number of an axis in a path.
 fn number(index: usize) -> &'static str {
     NAMES.get(index).map_or("", |&[_, number]| number)
@@ -41,7 +51,7 @@ pub(crate) fn canonical(path: &str) -> Option<Path> {
     // By `get`: slicing, should it fail, would want to print the text.
     let (name, below) = rest.split_at_checked(end).unwrap_or((rest, ""));
     let [_, index] = NAMES.iter().find(|names| names.contains(&name))?;
-    joined([AXES, index, below])
+    joined([AXES, index, present_name(below)])
 }
 
 /// The canonical path of what a person may write: `x/limits/max_velocity_mm_s` for `/axes/0/limits/max_velocity_mm_s`.

@@ -1,7 +1,7 @@
 //! One axis, from encoder counts to the voltage of an amplifier.
 #![no_std]
 
-use quadrant_law::axis::{Axis, AxisError, AxisState};
+use quadrant_law::axis::{Axis, AxisError, AxisState, OutputStage};
 use quadrant_law::command::Command;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::encoder::EncoderReading;
@@ -38,7 +38,6 @@ const FRICTION: StaticFriction = StaticFriction {
 pub struct Servo {
     axis: Axis<f32, 8>,
     state: AxisState<f32, 8>,
-    ticks: u32,
     fault: Option<FaultCode>,
 }
 
@@ -53,7 +52,7 @@ impl Servo {
         let friction = FrictionSettings::new(FRICTION, GmsParameters::new(blocks, 5.0));
         let gains = FeedforwardGains::whole(14.4e-6);
         let axis = Axis::build(SCALE, |axis| {
-            axis.amplifier(9.0, 10.0, 0.0, false)
+            axis.output(OutputStage::limited_to(9.0))
                 .pid(&GAINS, 2.0)
                 .feedforward(FeedforwardKind::Combined, &gains, &friction, 12)
                 .overspeed(Overspeed::new(50.0))
@@ -62,7 +61,6 @@ impl Servo {
         Ok(Self {
             axis,
             state: AxisState::default(),
-            ticks: 0,
             fault: None,
         })
     }
@@ -70,10 +68,7 @@ impl Servo {
     /// One control period: the counter of the encoder in, the converter's word out. `None`: switch the amplifier off.
     pub fn tick(&mut self, motion: &Motion<f32>, count: u32, enable: bool) -> Option<DacCode> {
         let reading = EncoderReading::of(count);
-        let word = self
-            .axis
-            .tick(&mut self.state, motion, &reading, self.ticks);
-        self.ticks = self.ticks.wrapping_add(1);
+        let word = self.axis.tick(&mut self.state, motion, &reading);
         self.fault = self.fault.or(word.err());
         if self.fault.is_some() || !enable {
             // While it is off the axis forgets, so that it holds from where it is when it is switched on.

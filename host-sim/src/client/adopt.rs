@@ -9,7 +9,7 @@ use super::settings::{self, Difference, whole_path};
 use quadrant_simulation::setting_value::short;
 
 /// The gains of the friction feedforward, which the scale multiplies.
-const GAINS: [&str; 3] = ["gms", "level", "viscous"];
+const GAINS: [&str; 3] = ["presliding", "level", "viscous"];
 
 /// Largest gain that the settings take.
 const MOST: f64 = 2.0;

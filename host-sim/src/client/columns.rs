@@ -31,7 +31,7 @@ const fn axis_column(signal: AxisSignal) -> &'static str {
         AxisSignal::Derivative => "d_v",
         AxisSignal::Level => "level_v",
         AxisSignal::Viscous => "viscous_v",
-        AxisSignal::Gms => "gms_v",
+        AxisSignal::Presliding => "presliding_v",
         AxisSignal::Inertia => "inertia_v",
         AxisSignal::BumplessOffset => "transfer_v",
         AxisSignal::Output => "voltage_v",

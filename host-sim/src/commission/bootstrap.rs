@@ -94,7 +94,7 @@ pub fn with_rough_friction(
     settings.feedforward.gains = FeedforwardGains {
         level: ROUGH_SHARE,
         viscous: 0.0,
-        gms: 0.0,
+        presliding: 0.0,
         inertia_v_s2_per_mm: ROUGH_SHARE / gain_mm_per_v_s2,
     };
     settings

@@ -357,7 +357,7 @@ impl Models {
         settings.feedforward.gains = FeedforwardGains {
             level: 1.0,
             viscous: 1.0,
-            gms: 1.0,
+            presliding: 1.0,
             inertia_v_s2_per_mm: 1.0 / plant.plant.gain_mm_per_v_s2,
         };
         let longest_s = MAX_PREVIEW_TICKS as f64 / rate_hz;

@@ -483,7 +483,7 @@ fn with_friction(settings: &AxisSettings, factor: f64) -> AxisSettings {
     let mut scaled = settings.clone();
     let gains = &mut scaled.feedforward.gains;
     gains.level *= factor;
-    gains.gms *= factor;
+    gains.presliding *= factor;
     scaled
 }
 

@@ -69,7 +69,7 @@ fn a_law_is_not_refused_because_the_axis_warmed_before_it_was_tried() {
     settings.feedback.pid.ki_v_per_mm_s *= 0.5;
     settings.feedforward.gains.level = 0.0;
     settings.feedforward.gains.viscous = 0.0;
-    settings.feedforward.gains.gms = 0.0;
+    settings.feedforward.gains.presliding = 0.0;
     let mut warming = Warming {
         axis: SimulatedTestAxis::new(0, x(), 2),
         rises_per_s: 0.010,

@@ -142,7 +142,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             .map_err(|error| invalid(format_args!("{error}")))?;
         let mut motions = [MotionSettings::Hold; 3];
         motions[index(axis)] = MotionSettings::PointToPoint(motion);
-        self.hand_over(&PlanSettings { motions })?;
+        self.queue_plan(&PlanSettings { motions })?;
         self.order(Order::Move(axis))?;
         Ok(Reply::Done)
     }
@@ -170,14 +170,14 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             )));
         }
         let plan = PlanSettings::translated(plan);
-        self.hand_over(&plan)?;
+        self.queue_plan(&plan)?;
         let reach_mm = PerAxis::from_fn(|axis| reach_mm(&plan.motions[index(axis)]));
         self.defer(Work::Plan(reach_mm))
     }
 
     /// Plans motions that keep to their axes' limits where control takes them from when it is ordered to.
     #[inline(never)]
-    fn hand_over(&mut self, plan: &PlanSettings) -> Result<(), LinkError> {
+    fn queue_plan(&mut self, plan: &PlanSettings) -> Result<(), LinkError> {
         let settings = self.in_force()?;
         plan.validate(settings)
             .map_err(|error| invalid(format_args!("{error}")))?;

@@ -1,7 +1,7 @@
 //! The slow half of telemetry: samples into blocks for the link, gaps counted.
 
 use heapless::Vec;
-use quadrant_link::message::{Channel, MAX_CHANNELS, TelemetryBlock, Words};
+use quadrant_link::message::{Channel, MAX_CHANNELS, SampleWords, TelemetryBlock};
 
 use super::read::shown;
 use super::sampler::Sample;
@@ -50,7 +50,7 @@ impl Packer {
             tick: sample.tick,
             dropped: self.dropped,
             channels: self.channels.len() as u8,
-            words: Words::new(),
+            words: SampleWords::new(),
         };
         // Cannot fail: a block holds many samples.
         let _ = begun.words.extend(words);

@@ -54,7 +54,7 @@ const fn quantity(signal: AxisSignal) -> Option<Quantity> {
         | AxisSignal::Derivative
         | AxisSignal::Level
         | AxisSignal::Viscous
-        | AxisSignal::Gms
+        | AxisSignal::Presliding
         | AxisSignal::Inertia
         | AxisSignal::BumplessOffset
         | AxisSignal::Output
@@ -113,7 +113,7 @@ fn read_axis<S: Scalar, const N: usize>(
         AxisSignal::Derivative => seen.feedback.derivative.to_word(),
         AxisSignal::Level => seen.feedforward.level.to_word(),
         AxisSignal::Viscous => seen.feedforward.viscous.to_word(),
-        AxisSignal::Gms => seen.feedforward.gms.to_word(),
+        AxisSignal::Presliding => seen.feedforward.presliding.to_word(),
         AxisSignal::Inertia => seen.feedforward.inertia.to_word(),
         AxisSignal::BumplessOffset => seen.bumpless_offset.to_word(),
         AxisSignal::Output => seen.output.to_word(),

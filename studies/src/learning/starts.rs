@@ -52,7 +52,7 @@ impl Start {
 fn with_gains(axis: &AxisSettings, factor: f64) -> AxisSettings {
     let mut axis = axis.clone();
     let gains = &mut axis.feedforward.gains;
-    for gain in [&mut gains.gms, &mut gains.level, &mut gains.viscous] {
+    for gain in [&mut gains.presliding, &mut gains.level, &mut gains.viscous] {
         *gain *= factor;
     }
     axis

@@ -65,7 +65,7 @@ impl Parameters {
             integral_limit: feedback.integral_limit_v as f32,
             viscous: senses.map(|sense| (feedforward.viscous * sense.viscous_v_s_per_mm) as f32),
             inertia: feedforward.inertia_v_s2_per_mm as f32,
-            share: feedforward.gms as f32,
+            share: feedforward.presliding as f32,
             stiffness: core::array::from_fn(|i| element(i).stiffness_v_per_mm as f32),
             weight: core::array::from_fn(|i| element(i).weight as f32),
             largest: gain.largest() as f32,

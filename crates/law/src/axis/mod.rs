@@ -4,68 +4,60 @@
 //! what it remembers. The stage ticks three of them together; [`Axis::tick`] ticks one alone.
 //!
 //! ```
-//! use quadrant_law::axis::{Axis, AxisState};
+//! use quadrant_law::axis::{Axis, AxisState, OutputStage};
 //! use quadrant_law::control::pid::PidGains;
 //! use quadrant_law::encoder::EncoderReading;
 //! use quadrant_law::reference::{Motion, MotionScale};
 //!
 //! let gains = PidGains { kp_v_per_mm: 1.0, ki_v_per_mm_s: 0.5, kd_v_s_per_mm: 5e-3, derivative_filter_s: 50e-6 };
-//! // Counts of 0.5 um, 10 000 ticks a second, outputs within +-9 V on a converter of +-10 V.
+//! // Counts of 0.5 um, 10 000 ticks a second, outputs within +-9 V of a converter of +-10 V.
 //! let scale = MotionScale::new(0.5e-3, 1e4);
-//! let axis = Axis::<f32, 8>::build(scale, |axis| axis.amplifier(9.0, 10.0, 0.0, false).pid(&gains, 2.0))?;
+//! let axis = Axis::<f32, 8>::build(scale, |axis| axis.output(OutputStage::limited_to(9.0)).pid(&gains, 2.0))?;
 //! let mut state = AxisState::default();
-//! axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(0), 0).unwrap();
+//! axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(0)).unwrap();
 //! // Pushed one count away, the axis pushes back.
-//! let code = axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(1), 1).unwrap();
+//! let code = axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(1)).unwrap();
 //! assert!(code.to_volts(10.0) < 0.0);
 //! # Ok::<(), quadrant_law::axis::AxisError>(())
 //! ```
 
 mod build;
+mod output;
 mod rest;
+mod state;
 pub mod telemetry;
 
-use core::fmt;
 use core::hint::cold_path;
 
+pub use self::build::{AxisBuilder, AxisError};
+use self::output::Amplifier;
+pub use self::output::OutputStage;
 use self::rest::RestState;
+pub use self::state::AxisState;
 use self::telemetry::{AxisTelemetry, LimitedBy};
-use crate::cancelling::{
-    Cancelling, CancellingLoop, CancellingSettings, CancellingState, Cut, SpindleSpeed,
-};
+use crate::cancelling::{Cancelling, Cut};
 use crate::command::Command;
 use crate::control::feedback::Feedback;
 use crate::control::filter::{Filters, FiltersState};
 use crate::control::pid::Pid;
 use crate::control::terms::{FeedbackInput, FeedbackState, FeedbackTerms};
-use crate::decimal::Decimal;
-use crate::encoder::{Encoder, EncoderReading, EncoderState};
-use crate::feedforward::{
-    Feedforward, FeedforwardGains, FeedforwardKind, FeedforwardState, FeedforwardTerms,
-    ReferenceStep,
-};
-use crate::friction::FrictionSettings;
+use crate::encoder::{Encoder, EncoderReading};
+use crate::feedforward::{Feedforward, FeedforwardTerms, ReferenceStep};
 use crate::homing::HomingInput;
 use crate::learning::{Learning, LearningInput, LearningState, LearningStatus};
-use crate::motion::{
-    GeneratorEvent, GeneratorState, MotionMode, ReferenceGenerator, ReferenceState,
-};
-use crate::reference::{Motion, ReferenceSample, Segment};
-use crate::rounding;
+use crate::motion::{GeneratorEvent, MotionMode, ReferenceGenerator};
+use crate::reference::{Motion, ReferenceSample};
 use crate::safety::monitor::{
-    Following, FollowingState, IndexSpacing, IndexState, Overspeed, OverspeedState, SignalLoss,
-    SignalLossState, speed_limit,
+    Following, IndexSpacing, Overspeed, OverspeedState, SignalLoss, SignalLossState,
 };
-use crate::safety::oscillation::{
-    Oscillation, OscillationInput, OscillationReading, OscillationState,
-};
-use crate::safety::overload::{Overload, OverloadState};
-use crate::safety::plausibility::{Plausibility, PlausibilityState, Shown, is_due};
+use crate::safety::oscillation::{Oscillation, OscillationInput};
+use crate::safety::overload::Overload;
+use crate::safety::plausibility::{Plausibility, Shown, is_due};
 use crate::safety::standstill::{Standstill, StandstillState};
 use crate::safety::travel::{Travel, TravelState};
 use crate::safety::{AxisSwitches, FaultCode};
 use crate::scalar::{Quantity, Scalar};
-use crate::units::{DacCode, POSITION_FRACTION_BITS, POSITION_UNITS_PER_COUNT, Position};
+use crate::units::{DacCode, POSITION_FRACTION_BITS, Position};
 
 /// Ticks that the feedforward can look ahead at most: 3 ms at 10 kHz.
 pub const MAX_PREVIEW_TICKS: usize = 30;
@@ -75,25 +67,6 @@ const PREVIEW_ROOM: usize = MAX_PREVIEW_TICKS + 2;
 
 /// A speed in 2^-8 counts as a displacement.
 const SPEED_SHIFT: u32 = POSITION_FRACTION_BITS - 8;
-
-/// The output stage of an axis.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Amplifier<S: Scalar> {
-    limit: S,
-    codes_per_volt: S::Gain,
-    offset_code: i32,
-}
-
-impl<S: Scalar> Amplifier<S> {
-    #[inline(always)]
-    fn code(&self, output: S) -> DacCode {
-        DacCode::saturating(
-            output
-                .round_scaled(self.codes_per_volt)
-                .saturating_add(self.offset_code),
-        )
-    }
-}
 
 /// An axis ready for the tick; `N` is the room for GMS elements. Made by an [`AxisBuilder`].
 ///
@@ -145,514 +118,6 @@ pub enum Commissioning {
     Done,
 }
 
-/// Puts the parts of an axis together, in place: no temporary is as large as an axis. Settings time only.
-///
-/// Parts that are not given are absent: no feedforward, no homing, no limits but the amplifier's, and a 32-bit encoder.
-#[derive(Debug)]
-pub struct AxisBuilder<'a, S: Scalar, const N: usize> {
-    axis: &'a mut Axis<S, N>,
-    period_s: f64,
-    error: Option<AxisError>,
-}
-
-/// A part that an axis cannot be made with.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AxisError {
-    /// The length of an encoder count, mm: not above zero.
-    Resolution(f64),
-    /// The control period, s: not above zero.
-    Period(f64),
-    /// The output limit, V: not above zero, beyond the amplifier's full scale, or not given.
-    OutputLimit(f64),
-    /// The preview in ticks: more than [`MAX_PREVIEW_TICKS`].
-    Preview(usize),
-    /// The time constant of a bumpless offset, s: not above zero.
-    Bumpless(f64),
-}
-
-impl fmt::Display for AxisError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Resolution(mm) => write!(f, "a count of {} mm is not above zero", Decimal(*mm)),
-            Self::Period(s) => write!(f, "a control period of {} s is not above zero", Decimal(*s)),
-            Self::OutputLimit(v) => write!(
-                f,
-                "an output limit of {} V is not above zero and within the amplifier's full scale",
-                Decimal(*v)
-            ),
-            Self::Preview(ticks) => write!(
-                f,
-                "a preview of {ticks} ticks is longer than {MAX_PREVIEW_TICKS}"
-            ),
-            Self::Bumpless(s) => {
-                write!(f, "a bumpless time of {} s is not above zero", Decimal(*s))
-            }
-        }
-    }
-}
-
-impl core::error::Error for AxisError {}
-
-/// True for a number above zero that is finite.
-fn is_positive(value: f64) -> bool {
-    value > 0.0 && value < f64::INFINITY
-}
-
-impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
-    /// Begins an axis in the place of one that is no longer used. An encoder count is `resolution_mm` long, a tick
-    /// takes `period_s`.
-    pub fn new(axis: &'a mut Axis<S, N>, resolution_mm: f64, period_s: f64) -> Self {
-        let unit_mm = resolution_mm / POSITION_UNITS_PER_COUNT;
-        axis.encoder = Encoder::new(32, false, i32::MAX);
-        axis.unit_mm = S::gain(unit_mm, Quantity::Integer, Quantity::Length);
-        axis.unit_mm_s = S::gain(unit_mm / period_s, Quantity::Integer, Quantity::Velocity);
-        axis.feedback = Feedback::Pid(Pid::default());
-        axis.filters = Filters::NONE;
-        axis.feedforward.switch_off();
-        axis.preview_ticks = 0;
-        axis.amplifier = Amplifier::default();
-        axis.bumpless_decay = S::ZERO;
-        axis.overspeed = Overspeed::UNLIMITED;
-        axis.signal_loss = SignalLoss::off();
-        axis.plausibility = Plausibility::default();
-        axis.overload = Overload::UNLIMITED;
-        axis.oscillation = Oscillation::off();
-        axis.index_spacing = IndexSpacing::default();
-        axis.following = Following::unlimited();
-        axis.travel = Travel::UNLIMITED;
-        axis.standstill = Standstill::ALWAYS;
-        axis.reduced_speed = u32::MAX;
-        axis.generator = ReferenceGenerator::default();
-        axis.commissioning = Commissioning::Done;
-        axis.adapts = false;
-        axis.learns = false;
-        axis.learning = Learning::off();
-        axis.cancels = false;
-        axis.cancelling.switch_off();
-        let builder = Self {
-            axis,
-            period_s,
-            error: None,
-        };
-        builder
-            .require(
-                is_positive(resolution_mm),
-                AxisError::Resolution(resolution_mm),
-            )
-            .require(is_positive(period_s), AxisError::Period(period_s))
-    }
-
-    /// Keeps the first error.
-    fn require(mut self, holds: bool, error: AxisError) -> Self {
-        if !holds && self.error.is_none() {
-            self.error = Some(error);
-        }
-        self
-    }
-
-    /// The encoder's counter; 32 bits unless given.
-    #[must_use]
-    pub fn encoder(self, encoder: Encoder) -> Self {
-        self.axis.encoder = encoder;
-        self
-    }
-
-    /// The output stage: outputs within +-`limit_v` on a converter of +-`full_scale_v`, whose zero lies at `offset_v`;
-    /// reversed, a positive output turns the motor the other way.
-    #[must_use]
-    pub fn amplifier(self, limit_v: f64, full_scale_v: f64, offset_v: f64, reversed: bool) -> Self {
-        let sign = if reversed { -1.0 } else { 1.0 };
-        let codes_per_volt = DacCode::FULL_SCALE / full_scale_v;
-        self.axis.amplifier = Amplifier {
-            limit: S::quantise(limit_v, Quantity::Voltage),
-            codes_per_volt: S::gain(sign * codes_per_volt, Quantity::Voltage, Quantity::Integer),
-            offset_code: rounding::round(offset_v * codes_per_volt) as i32,
-        };
-        self.require(
-            is_positive(limit_v) && limit_v <= full_scale_v,
-            AxisError::OutputLimit(limit_v),
-        )
-    }
-
-    /// The feedback law, built for the same control period.
-    #[must_use]
-    pub fn feedback(self, feedback: Feedback<S>) -> Self {
-        self.axis.feedback = feedback;
-        self
-    }
-
-    /// The filters behind the feedback law, built for the same control period.
-    #[must_use]
-    pub fn filters(self, filters: Filters<S>) -> Self {
-        self.axis.filters = filters;
-        self
-    }
-
-    /// The feedforward, which looks `preview_ticks` ahead: the dead time of the plant.
-    #[must_use]
-    pub fn feedforward(
-        self,
-        kind: FeedforwardKind,
-        gains: &FeedforwardGains,
-        friction: &FrictionSettings,
-        preview_ticks: usize,
-    ) -> Self {
-        self.axis
-            .feedforward
-            .build_over(kind, gains, friction, self.period_s);
-        self.axis.preview_ticks = preview_ticks;
-        self.require(
-            preview_ticks <= MAX_PREVIEW_TICKS,
-            AxisError::Preview(preview_ticks),
-        )
-    }
-
-    /// The time constant with which the offset fades that makes a change of settings bumpless, s.
-    #[must_use]
-    pub fn bumpless(self, time_s: f64) -> Self {
-        self.axis.bumpless_decay =
-            S::quantise(libm::exp(-self.period_s / time_s), Quantity::Fraction);
-        self.require(is_positive(time_s), AxisError::Bumpless(time_s))
-    }
-
-    /// The limit of the measured speed.
-    #[must_use]
-    pub fn overspeed(self, overspeed: Overspeed) -> Self {
-        self.axis.overspeed = overspeed;
-        self
-    }
-
-    /// The monitor of the encoder's signal.
-    #[must_use]
-    pub fn signal_loss(self, signal_loss: SignalLoss<S>) -> Self {
-        self.axis.signal_loss = signal_loss;
-        self
-    }
-
-    /// The comparison of the encoder with the plant.
-    #[must_use]
-    pub fn plausibility(self, plausibility: Plausibility) -> Self {
-        self.axis.plausibility = plausibility;
-        self
-    }
-
-    /// The load that the motor withstands.
-    #[must_use]
-    pub fn overload(self, overload: Overload) -> Self {
-        self.axis.overload = overload;
-        self
-    }
-
-    /// The monitor for oscillation.
-    #[must_use]
-    pub fn oscillation(self, oscillation: Oscillation<S>) -> Self {
-        self.axis.oscillation = oscillation;
-        self
-    }
-
-    /// Learning of the friction feedforward's scale.
-    #[must_use]
-    pub fn learning(self, learning: Learning<S>) -> Self {
-        self.axis.learns = learning.is_on();
-        self.axis.learning = learning;
-        self.axis.adapts = self.axis.learns | self.axis.cancels;
-        self
-    }
-
-    /// Cancelling of a cut's vibration.
-    #[must_use]
-    pub fn cancelling(self, parts: Option<(&CancellingSettings, &impl CancellingLoop)>) -> Self {
-        if let Some((settings, of)) = parts {
-            self.axis.cancelling.build_over(settings, of, self.period_s);
-        }
-        self.axis.cancels = self.axis.cancelling.is_on();
-        self.axis.adapts = self.axis.learns | self.axis.cancels;
-        self
-    }
-
-    /// The distance of the encoder's index pulses.
-    #[must_use]
-    pub fn index_spacing(self, index_spacing: IndexSpacing) -> Self {
-        self.axis.index_spacing = index_spacing;
-        self
-    }
-
-    /// The limit of the tracking error.
-    #[must_use]
-    pub fn following(self, following: Following<S>) -> Self {
-        self.axis.following = following;
-        self
-    }
-
-    /// The soft limits, in force once the axis is homed.
-    #[must_use]
-    pub fn travel(self, travel: Travel) -> Self {
-        self.axis.travel = travel;
-        self
-    }
-
-    /// The measured speed below which the axis stands, counts per tick; half a count is added for the quantisation.
-    #[must_use]
-    pub fn standstill(self, counts_per_tick: f64) -> Self {
-        self.axis.standstill = Standstill::new(counts_per_tick);
-        self
-    }
-
-    /// The limit of the measured speed until the axis is homed, counts per tick; half a count is added for the
-    /// quantisation. With it, the axis starts no motion but jogs and homing until then.
-    #[must_use]
-    pub fn reduced_speed(self, counts_per_tick: Option<f64>) -> Self {
-        self.axis.reduced_speed = counts_per_tick.map_or(u32::MAX, speed_limit);
-        self
-    }
-
-    /// The reference generator, for motions beside the plan's.
-    #[must_use]
-    pub fn generator(self, generator: ReferenceGenerator<S>) -> Self {
-        self.axis.generator = generator;
-        self
-    }
-
-    /// The standing of the settings; [`Commissioning::Done`] unless given.
-    #[must_use]
-    pub fn commissioning(self, commissioning: Commissioning) -> Self {
-        self.axis.commissioning = commissioning;
-        self
-    }
-
-    /// Ends the axis. A refused one puts out nothing.
-    ///
-    /// # Errors
-    /// The first part that was refused.
-    pub fn try_build(self) -> Result<(), AxisError> {
-        let driven = self.axis.amplifier.limit > S::ZERO;
-        let built = self.require(driven, AxisError::OutputLimit(0.0));
-        match built.error {
-            None => Ok(()),
-            Some(error) => {
-                built.axis.amplifier = Amplifier::default();
-                Err(error)
-            }
-        }
-    }
-}
-
-/// The memory of an axis. What every tick reads and writes comes first.
-#[derive(Clone, Debug, PartialEq)]
-#[repr(C)]
-pub struct AxisState<S: Scalar, const N: usize> {
-    encoder: EncoderState,
-    overspeed: OverspeedState,
-    signal_loss: SignalLossState,
-    /// The travel is in force.
-    homed: bool,
-    travel: TravelState,
-    telemetry: AxisTelemetry<S>,
-    /// The displacement of the reference at the feedforward's tick, and in the tick before.
-    displacement: Position,
-    displacement_before: Position,
-    /// The reference at the feedforward's tick, ahead of the feedback's.
-    look_ahead: Position,
-    following: FollowingState<S>,
-    /// The acceleration of the reference at the feedforward's tick, mm/s^2.
-    acceleration: S,
-    /// The velocity of the feedback's reference, mm/s, for a law that needs it.
-    reference_velocity: S,
-    /// Voltage that a host adds to the output in this tick, V.
-    injected: S,
-    feedback: FeedbackState<S>,
-    rest: RestState<S>,
-    filters: FiltersState<S>,
-    friction: FeedforwardState<S, N>,
-    generator: GeneratorState<S>,
-    plausibility: PlausibilityState,
-    overload: OverloadState,
-    oscillation: OscillationState,
-    preview: [Position; PREVIEW_ROOM],
-    /// Position of the axis at the last index pulse, until homing takes it.
-    pulse: Option<Position>,
-    index: IndexState,
-    learning: LearningState<S>,
-    cancelling: CancellingState<S>,
-}
-
-impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
-    fn default() -> Self {
-        Self {
-            encoder: EncoderState::default(),
-            generator: GeneratorState::default(),
-            pulse: None,
-            homed: false,
-            overspeed: OverspeedState::default(),
-            signal_loss: SignalLossState::default(),
-            plausibility: PlausibilityState::default(),
-            overload: OverloadState::default(),
-            oscillation: OscillationState::default(),
-            index: IndexState::default(),
-            following: FollowingState::default(),
-            travel: TravelState::default(),
-            displacement: Position::ZERO,
-            displacement_before: Position::ZERO,
-            acceleration: S::ZERO,
-            look_ahead: Position::ZERO,
-            preview: [Position::ZERO; PREVIEW_ROOM],
-            reference_velocity: S::ZERO,
-            feedback: FeedbackState::default(),
-            rest: RestState::default(),
-            filters: FiltersState::default(),
-            friction: FeedforwardState::default(),
-            injected: S::ZERO,
-            telemetry: AxisTelemetry::default(),
-            learning: LearningState::default(),
-            cancelling: CancellingState::default(),
-        }
-    }
-}
-
-impl<S: Scalar, const N: usize> AxisState<S, N> {
-    /// Every term of the law at the last tick.
-    pub fn telemetry(&self) -> &AxisTelemetry<S> {
-        &self.telemetry
-    }
-
-    /// The memory of learning: the friction's scale.
-    pub fn learning(&self) -> &LearningState<S> {
-        &self.learning
-    }
-
-    /// The memory of cancelling: the voltage that it adds.
-    pub fn cancelling(&self) -> &CancellingState<S> {
-        &self.cancelling
-    }
-
-    /// The oscillation that was found last.
-    pub fn oscillation(&self) -> OscillationReading {
-        self.oscillation.reading()
-    }
-
-    /// Sets the speed of the spindle.
-    pub(crate) fn set_spindle_speed(&mut self, speed: SpindleSpeed) {
-        self.cancelling.set_speed(speed);
-    }
-
-    /// True while a motion is under way.
-    pub fn is_running(&self) -> bool {
-        self.mode() != MotionMode::Hold
-    }
-
-    /// The present motion mode.
-    pub fn mode(&self) -> MotionMode {
-        self.generator.mode()
-    }
-
-    /// Voltage that a host adds to the output, V.
-    #[inline(always)]
-    pub fn injected(&self) -> S {
-        self.injected
-    }
-
-    /// Measured position, 2^-16 counts.
-    #[inline(always)]
-    pub(crate) fn measured(&self) -> Position {
-        self.encoder.position()
-    }
-
-    /// Measured and filtered speed, 2^-8 counts per tick.
-    #[inline(always)]
-    pub(crate) fn speed(&self) -> i32 {
-        self.overspeed.speed()
-    }
-
-    /// The axis' motion and output as it shows them.
-    #[inline(always)]
-    fn shown(&self) -> Shown {
-        Shown {
-            count: self.encoder.count().0 as i32,
-            speed: self.speed(),
-            words: self.telemetry.code_sum,
-            reference: Shown::reference(self.telemetry.reference),
-            open: self.mode() == MotionMode::OpenLoop,
-        }
-    }
-
-    /// Sets what is added to the output from this tick on, V.
-    pub(crate) fn inject(&mut self, voltage: S) {
-        self.injected = voltage;
-    }
-
-    /// Position of the look-ahead reference: that of the feedback follows by the preview.
-    pub fn reference(&self) -> Position {
-        self.look_ahead
-    }
-
-    /// True if there is room for a segment of a stream.
-    #[inline(always)]
-    pub fn wants_segment(&self) -> bool {
-        self.generator.stream.wants_segment()
-    }
-
-    /// Gives the axis the next segment of a stream; call it when [`AxisState::wants_segment`]. What is left of a stream
-    /// that was broken off is dropped.
-    #[inline(always)]
-    pub(crate) fn offer_segment(&mut self, segment: &Segment) {
-        self.generator.stream.offer(segment);
-    }
-
-    /// True if a stream can start: its first segment is there, and starts where the axis rests.
-    pub(crate) fn is_stream_ready(&self) -> bool {
-        self.mode() == MotionMode::Hold && self.generator.stream.is_ready(self.look_ahead)
-    }
-
-    /// True if the axis' position is that of the machine, so that its travel is in force.
-    pub fn is_homed(&self) -> bool {
-        self.homed
-    }
-
-    /// True if the encoder has shown an index pulse since the axis was homed last, or since the start.
-    pub fn is_indexed(&self) -> bool {
-        self.index.is_seen()
-    }
-
-    /// Takes the next sample of the look-ahead reference.
-    #[inline(always)]
-    fn move_reference(&mut self, ahead: &ReferenceSample<S>) {
-        self.displacement_before = self.displacement;
-        self.displacement = ahead.position - self.look_ahead;
-        self.look_ahead = ahead.position;
-        self.telemetry.velocity = ahead.velocity;
-        self.acceleration = ahead.acceleration;
-    }
-
-    #[inline(always)]
-    fn reference_state(&self) -> ReferenceState {
-        ReferenceState {
-            position: self.look_ahead,
-            displacement: self.displacement,
-            before: self.displacement_before,
-        }
-    }
-
-    /// The largest tracking error since enabling, against its limit.
-    #[inline(always)]
-    pub fn following(&self) -> FollowingState<S> {
-        self.following
-    }
-
-    /// The largest tracking error since enabling as a share of its limit at the time: above 1 after a following error.
-    /// It stays until the next enabling. For telemetry; it divides.
-    pub fn following_high_mark(&self) -> f32 {
-        self.following.high_mark()
-    }
-
-    /// Declares the present count that of the machine, or not: homing does, and a board whose encoders are absolute.
-    pub(crate) fn set_homed(&mut self, homed: bool) {
-        if self.homed != homed {
-            self.homed = homed;
-            self.travel = TravelState::default();
-        }
-    }
-}
-
 impl<S: Scalar, const N: usize> Axis<S, N> {
     /// An axis that puts out nothing: room for one that an [`AxisBuilder`] makes in its place.
     #[inline(never)]
@@ -693,7 +158,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     }
 
     /// One control period of an axis that is driven by itself, without a stage: reads the encoder, advances the
-    /// reference, computes the output. `tick` numbers the ticks.
+    /// reference, computes the output.
     ///
     /// # Errors
     /// The fault that was found, if any. It is the caller who switches the amplifier off.
@@ -702,10 +167,31 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         state: &mut AxisState<S, N>,
         motion: &Motion<S>,
         reading: &EncoderReading,
-        tick: u32,
     ) -> Result<DacCode, FaultCode> {
+        let tick = state.count_tick();
         self.read_encoder(state, reading, is_due(tick, 0))?;
         self.update_reference(state, motion, AxisSwitches::default(), tick)?;
+        Ok(self.drive(state, false))
+    }
+
+    /// One control period of an axis that is driven by itself, on a reference from elsewhere: a trajectory planner of the
+    /// caller's. `ahead` is where the reference will be after the preview, and its derivatives there. It begins where the axis
+    /// was [enabled](Self::enable).
+    ///
+    /// # Errors
+    /// The fault that was found, if any. It is the caller who switches the amplifier off.
+    pub fn follow(
+        &self,
+        state: &mut AxisState<S, N>,
+        ahead: &ReferenceSample<S>,
+        reading: &EncoderReading,
+    ) -> Result<DacCode, FaultCode> {
+        let tick = state.count_tick();
+        self.read_encoder(state, reading, is_due(tick, 0))?;
+        state.move_reference(ahead);
+        let found = self.check_limits(state, AxisSwitches::default());
+        self.form_error(state, tick)?;
+        found?;
         Ok(self.drive(state, false))
     }
 
@@ -929,6 +415,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             homed: _,
             overload: _,
             index: _,
+            ticks: _,
             overspeed,
             signal_loss,
             travel,

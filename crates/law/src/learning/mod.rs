@@ -432,7 +432,7 @@ impl<S: Scalar> Learning<S> {
     /// Passes the friction of this tick through the gate, and scales it.
     #[inline(always)]
     pub(crate) fn apply(&self, state: &mut LearningState<S>, terms: &mut FeedforwardTerms<S>) {
-        state.presliding = terms.level + terms.gms;
+        state.presliding = terms.level + terms.presliding;
         terms.gate_friction(self.one + state.gate.deviation());
         state.friction = terms.friction();
         terms.scale_friction(self.scale(state));

@@ -79,7 +79,7 @@ pub(crate) const fn is_due(tick: u32, index: usize) -> bool {
 
 /// The converter's words as a voltage. Settings time only.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Words {
+pub struct OutputScale {
     /// Words that a volt is, negative if the amplifier is reversed.
     pub per_volt: f64,
     /// The word of zero volts.
@@ -257,7 +257,12 @@ struct Lag {
 
 impl Plausibility {
     /// The comparison with a model, of an encoder with counts of `resolution_mm`, in ticks of `period_s`. Settings time only.
-    pub fn new(model: &PlausibilityModel, words: Words, resolution_mm: f64, period_s: f64) -> Self {
+    pub fn new(
+        model: &PlausibilityModel,
+        words: OutputScale,
+        resolution_mm: f64,
+        period_s: f64,
+    ) -> Self {
         let interval_s = INTERVAL_TICKS * period_s;
         // A speed in the filter's unit.
         let filtered = period_s / resolution_mm * f64::from(1u32 << SPEED_FRACTION_BITS);
@@ -305,7 +310,12 @@ impl Plausibility {
 
     /// A budget of `budget_v_s` volt-seconds beyond `breakaway_v`, in open loop, for an axis of which there is no model.
     /// Settings time only.
-    pub fn without_model(budget_v_s: f64, breakaway_v: f64, words: Words, period_s: f64) -> Self {
+    pub fn without_model(
+        budget_v_s: f64,
+        breakaway_v: f64,
+        words: OutputScale,
+        period_s: f64,
+    ) -> Self {
         let units = |value: f64| rounding::round(value * UNITS_PER_VOLT) as i32;
         Self {
             // What friction takes up is unknown.
@@ -318,7 +328,7 @@ impl Plausibility {
     }
 
     /// The converter's words as forces; a volt is `per_volt` of them.
-    fn of_words(words: Words, per_volt: f64) -> Self {
+    fn of_words(words: OutputScale, per_volt: f64) -> Self {
         let scale = f64::from(1u32 << PUSH_BITS) / INTERVAL_TICKS;
         Self {
             offset: words.offset << INTERVAL_BITS,

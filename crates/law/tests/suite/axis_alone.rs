@@ -2,14 +2,14 @@
 
 use quadrant_law::axes::AxisName;
 use quadrant_law::axis::telemetry::LimitedBy;
-use quadrant_law::axis::{Axis, AxisBuilder, AxisError, AxisState};
+use quadrant_law::axis::{Axis, AxisBuilder, AxisError, AxisState, OutputStage};
 use quadrant_law::command::Command;
 use quadrant_law::control::feedback::{Feedback, LawKind};
 use quadrant_law::control::pid::{Pid, PidGains};
 use quadrant_law::encoder::EncoderReading;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::injection::{Coupling, Injection};
-use quadrant_law::reference::{Motion, MotionScale};
+use quadrant_law::reference::{Motion, MotionScale, MotionState, ReferenceSample};
 use quadrant_law::safety::{AxisSwitches, FaultCode, Switches};
 use quadrant_law::stage::StageState;
 use quadrant_law::units::{DacCode, Position};
@@ -46,11 +46,11 @@ fn an_axis_is_not_made_of_parts_that_cannot_be_and_the_first_is_named() {
         let stage = axis.clone();
         let mut state = AxisState::default();
         let code = stage
-            .tick(&mut state, &Motion::Hold, &EncoderReading::of(0), 0)
+            .tick(&mut state, &Motion::Hold, &EncoderReading::of(0))
             .map_or(0, |code| code.0);
         (error, code)
     }
-    let usual: Change = |builder| builder.amplifier(10.0, 10.0, 0.0, false);
+    let usual: Change = |builder| builder.output(OutputStage::limited_to(10.0));
     assert_eq!(build(RESOLUTION_MM, PERIOD_S, usual).0, None);
     for bad in [0.0, -1e-3, f64::INFINITY, f64::NAN] {
         for (error, of) in [
@@ -67,29 +67,34 @@ fn an_axis_is_not_made_of_parts_that_cannot_be_and_the_first_is_named() {
     let refused: [(Change, &str); 7] = [
         (|builder| builder, "an output limit of 0 V"),
         (
-            |builder| builder.amplifier(0.0, 10.0, 0.0, false),
+            |builder| builder.output(OutputStage::limited_to(0.0)),
             "limit of 0 V",
         ),
         (
-            |builder| builder.amplifier(-1.0, 10.0, 0.0, false),
+            |builder| builder.output(OutputStage::limited_to(-1.0)),
             "limit of -1 V",
         ),
         (
-            |builder| builder.amplifier(10.5, 10.0, 0.0, false),
+            |builder| builder.output(OutputStage::limited_to(10.5)),
             "10.5 V",
         ),
         (
-            |builder| builder.amplifier(f64::INFINITY, f64::INFINITY, 0.0, false),
+            |builder| {
+                builder.output(OutputStage {
+                    full_scale_v: f64::INFINITY,
+                    ..OutputStage::limited_to(f64::INFINITY)
+                })
+            },
             "within the amplifier's full scale",
         ),
         (
-            |builder| builder.amplifier(10.0, 10.0, 0.0, false).bumpless(0.0),
+            |builder| builder.output(OutputStage::limited_to(10.0)).bumpless(0.0),
             "a bumpless time of 0 s",
         ),
         (
             |builder| {
                 let gains = StageSettings::simulated().axes[0].feedforward.gains;
-                builder.amplifier(10.0, 10.0, 0.0, false).feedforward(
+                builder.output(OutputStage::limited_to(10.0)).feedforward(
                     quadrant_law::feedforward::FeedforwardKind::None,
                     &gains,
                     &StageSettings::simulated().axes[0].friction,
@@ -117,13 +122,13 @@ fn an_axis_by_value_is_the_axis_in_place() {
     let gains = &x.feedback.pid;
     let kind = FeedforwardKind::Combined;
     let by_value = Axis::<f64, 4>::build(scale, |axis| {
-        axis.amplifier(10.0, 10.0, 0.0, false)
+        axis.output(OutputStage::limited_to(10.0))
             .pid(gains, 2.0)
             .feedforward(kind, &x.feedforward.gains, &x.friction, 12)
     });
     let mut in_place = Axis::<f64, 4>::blank();
     AxisBuilder::new(&mut in_place, RESOLUTION_MM, PERIOD_S)
-        .amplifier(10.0, 10.0, 0.0, false)
+        .output(OutputStage::limited_to(10.0))
         .feedback(Feedback::Pid(Pid::build(gains, 2.0, PERIOD_S)))
         .feedforward(kind, &x.feedforward.gains, &x.friction, 12)
         .try_build()
@@ -155,24 +160,24 @@ fn an_axis_by_value_is_refused_as_in_place() {
 fn a_tick_of_one_axis_reads_follows_and_puts_out() {
     let mut axis = Axis::<f64, 4>::blank();
     AxisBuilder::new(&mut axis, RESOLUTION_MM, PERIOD_S)
-        .amplifier(10.0, 10.0, 0.0, false)
+        .output(OutputStage::limited_to(10.0))
         .feedback(pid())
         .try_build()
         .expect("valid");
     let mut state = AxisState::default();
-    let mut tick = |reading: EncoderReading, number| {
-        axis.tick(&mut state, &Motion::Hold, &reading, number)
+    let mut tick = |reading: EncoderReading| {
+        axis.tick(&mut state, &Motion::Hold, &reading)
             .map(|code| code.0)
     };
-    assert_eq!(tick(EncoderReading::of(0), 0), Ok(0));
+    assert_eq!(tick(EncoderReading::of(0)), Ok(0));
     // 100 counts of 1 um at 1 V/mm: 0.1 V of 10 on a converter of 32767 steps.
-    assert_eq!(tick(EncoderReading::of(100), 1), Ok(-328));
-    assert_eq!(tick(EncoderReading::of(0xFFFF_FF9C), 2), Ok(328));
+    assert_eq!(tick(EncoderReading::of(100)), Ok(-328));
+    assert_eq!(tick(EncoderReading::of(0xFFFF_FF9C)), Ok(328));
     let invalid = EncoderReading {
         valid: false,
         ..EncoderReading::of(0)
     };
-    assert_eq!(tick(invalid, 3), Err(FaultCode::EncoderInvalid));
+    assert_eq!(tick(invalid), Err(FaultCode::EncoderInvalid));
 }
 
 #[test]
@@ -272,14 +277,14 @@ fn word_of_pushed_axis(away: i32, injected_word: i16) -> i16 {
         1e6,
     );
     rig.state.prepare_injection(injection);
-    rig.state.offer_voltage(injected_word, false);
+    rig.state.push_injection(injected_word, false);
     rig.inputs.command = Some(Command::StartInjection);
     let mut word = 0;
     for step in 0..400 {
         rig.inputs.set_counts([(away * 10 * step) as u32, 0, 0]);
         let outputs = rig.tick();
         assert!(outputs.enabled, "{:?}", rig.state.safety());
-        rig.state.offer_voltage(injected_word, false);
+        rig.state.push_injection(injected_word, false);
         word = outputs.codes[0].0;
     }
     word
@@ -314,11 +319,11 @@ fn a_voltage_beyond_the_limit_is_shown_as_limited_also_in_open_loop() {
     );
     rig.command(Command::Stop);
     rig.state.prepare_injection(injection);
-    rig.state.offer_voltage(3000, false);
+    rig.state.push_injection(3000, false);
     rig.command(Command::StartInjection);
     let shown = |rig: &Rig<f32>| rig.state.axes()[0].telemetry().limited_by;
     assert_eq!(shown(&rig), LimitedBy::Nothing);
-    rig.state.offer_voltage(30_000, false);
+    rig.state.push_injection(30_000, false);
     assert!(rig.tick().enabled);
     assert_eq!(shown(&rig), LimitedBy::OutputLimit);
 }
@@ -338,7 +343,7 @@ fn settings_that_change_while_a_voltage_is_added_make_no_step() {
         100.0,
     );
     rig.state.prepare_injection(injection);
-    rig.state.offer_voltage(10_000, false);
+    rig.state.push_injection(10_000, false);
     rig.command(Command::StartInjection);
     rig.inputs.set_counts([80, 0, 0]);
     let mut codes = vec![];
@@ -348,7 +353,7 @@ fn settings_that_change_while_a_voltage_is_added_make_no_step() {
             other.axes[0].feedback.pid.kp_v_per_mm *= 3.0;
             rig.exchange(&other);
         }
-        rig.state.offer_voltage(10_000, false);
+        rig.state.push_injection(10_000, false);
         let outputs = rig.tick();
         assert!(outputs.enabled, "{:?}", rig.state.safety());
         codes.push(outputs.codes[0].0);
@@ -464,13 +469,59 @@ fn a_law_that_needs_the_velocity_of_the_reference_has_nothing_to_do_on_an_axis_t
 }
 
 #[test]
+fn a_reference_from_elsewhere_gives_the_words_of_the_same_motion() {
+    let settings = StageSettings::simulated();
+    let axis: Axis<f32, 8> = settings.build_axis(AxisName::X);
+    let plan = sine_on_x(5.0, 10.0);
+    let plan = plan.build::<f32>(&settings).expect("valid plan");
+    let (mut own, mut elsewhere) = (AxisState::default(), AxisState::default());
+    axis.handle_command(&mut own, Command::Run);
+    let mut motion = MotionState::start(Position::ZERO);
+    let (mut moved, mut output) = (0, 0);
+    for tick in 0..8000 {
+        // An encoder that follows by 5 um, with noise of its last count.
+        let behind = own.telemetry().reference.0 >> 16;
+        let reading = EncoderReading::of((behind - 10 + i64::from(tick % 2)) as u32);
+        let code = axis.tick(&mut own, &plan[0], &reading);
+        let ahead = plan[0].step(&mut motion);
+        assert_eq!(
+            axis.follow(&mut elsewhere, &ahead, &reading),
+            code,
+            "tick {tick}"
+        );
+        moved = moved.max(ahead.position.0 >> 16);
+        output = output.max(code.map_or(0, |code| code.0));
+    }
+    assert!(moved > 1000 && output > 100, "{moved} counts, {output}");
+}
+
+#[test]
+fn a_reference_from_elsewhere_that_jumps_is_a_following_error() {
+    let settings = StageSettings::simulated();
+    let axis: Axis<f32, 8> = settings.build_axis(AxisName::X);
+    let mut state = AxisState::default();
+    let mut follow = |mm: f64| {
+        let ahead = ReferenceSample {
+            position: Position::from_mm(mm, settings.axes[0].encoder.resolution_mm),
+            ..ReferenceSample::default()
+        };
+        axis.follow(&mut state, &ahead, &EncoderReading::of(0))
+    };
+    for _ in 0..100 {
+        follow(0.0).expect("no fault");
+    }
+    let found = (0..100).find_map(|_| follow(20.0).err());
+    assert_eq!(found, Some(FaultCode::FollowingError));
+}
+
+#[test]
 fn the_feedback_follows_the_reference_by_the_longest_preview_that_there_is() {
     let longest = quadrant_law::axis::MAX_PREVIEW_TICKS;
     let mut axis = Axis::<f64, 4>::blank();
     let settings = StageSettings::simulated();
     let x = &settings.axes[0];
     AxisBuilder::new(&mut axis, RESOLUTION_MM, PERIOD_S)
-        .amplifier(10.0, 10.0, 0.0, false)
+        .output(OutputStage::limited_to(10.0))
         .feedback(pid())
         .feedforward(
             quadrant_law::feedforward::FeedforwardKind::None,
@@ -486,7 +537,7 @@ fn the_feedback_follows_the_reference_by_the_longest_preview_that_there_is() {
     axis.handle_command(&mut state, Command::Run);
     let mut ahead = vec![];
     for tick in 0..300 {
-        axis.tick(&mut state, &plan[0], &EncoderReading::of(0), tick)
+        axis.tick(&mut state, &plan[0], &EncoderReading::of(0))
             .expect("no fault");
         ahead.push(state.reference());
         if let Some(before) = ahead.len().checked_sub(longest + 1) {
@@ -515,7 +566,7 @@ fn an_injection_begins_only_with_its_first_value_and_on_an_axis_that_was_commiss
         rig.state
             .prepare_injection(Injection::new(axis, Coupling::Added, 1e-4, travel, 100.0));
         if with_value {
-            rig.state.offer_voltage(10, true);
+            rig.state.push_injection(10, true);
         }
         rig.command(Command::StartInjection);
         assert!(rig.state.safety().is_enabled());

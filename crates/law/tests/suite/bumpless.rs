@@ -151,7 +151,7 @@ fn feedforward_kinds_exchange_without_a_jump() {
 fn feedforward_gains_and_preview_change_without_a_jump() {
     let first = x_alone(|_| {});
     let changes: [Change; 4] = [
-        ("gms", |axis| axis.feedforward.gains.gms = 0.0),
+        ("gms", |axis| axis.feedforward.gains.presliding = 0.0),
         ("viscous", |axis| axis.feedforward.gains.viscous = 2.0),
         ("inertia", |axis| {
             axis.feedforward.gains.inertia_v_s2_per_mm = 1e-3

@@ -223,7 +223,7 @@ impl<S: Scalar> Bench<S> {
             // Without a frequency, a constant voltage.
             let wave = if hz > 0.0 { turn.sin() } else { 1.0 };
             let word = DacCode::from_volts(volts * wave, 10.0);
-            self.rig.state.offer_voltage(word.0, false);
+            self.rig.state.push_injection(word.0, false);
         }
     }
 

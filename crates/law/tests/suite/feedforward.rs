@@ -17,7 +17,7 @@ const PERIOD_S: f64 = 1e-4;
 const WHOLE: FeedforwardGains = FeedforwardGains {
     level: 1.0,
     viscous: 1.0,
-    gms: 1.0,
+    presliding: 1.0,
     inertia_v_s2_per_mm: 0.0,
 };
 
@@ -104,7 +104,11 @@ fn each_effect_counts_once_at_constant_velocity() {
 fn each_kind_has_its_terms_and_no_others() {
     let has = |kind| {
         let terms = settled::<f64>(kind, 5.0);
-        (terms.level != 0.0, terms.gms != 0.0, terms.viscous != 0.0)
+        (
+            terms.level != 0.0,
+            terms.presliding != 0.0,
+            terms.viscous != 0.0,
+        )
     };
     assert_eq!(has(FeedforwardKind::None), (false, false, false));
     assert_eq!(has(FeedforwardKind::Static), (true, false, true));
@@ -155,7 +159,7 @@ fn elements_take_over_the_force_of_bristles_and_stick() {
         let carried = state.force();
         for displacement in [1e-6, -1e-6] {
             let mut state = state.clone();
-            let force = elements.step(&mut state, step(displacement)).gms;
+            let force = elements.step(&mut state, step(displacement)).presliding;
             assert!((force - carried - stiffness * displacement).abs() < 1e-12);
         }
     }
@@ -177,7 +181,7 @@ proptest! {
             prop_assert!(terms.level.abs() <= 0.1501, "{terms:?}");
             // LuGre damps its bristles' bending: twice the level over sigma0 Ts / sigma1 in one step.
             let most = if kind == FeedforwardKind::Lugre { 0.5 } else { 0.1501 };
-            prop_assert!(terms.gms.abs() <= most, "{terms:?}");
+            prop_assert!(terms.presliding.abs() <= most, "{terms:?}");
             prop_assert!(state.force().abs() <= 0.1501, "{terms:?}");
         }
     }
@@ -210,7 +214,7 @@ fn zero_gains_are_off<S: Scalar>() {
             axis.feedforward.gains = FeedforwardGains {
                 level: 0.0,
                 viscous: 0.0,
-                gms: 0.0,
+                presliding: 0.0,
                 inertia_v_s2_per_mm: 0.0,
             };
         });

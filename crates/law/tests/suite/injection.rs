@@ -69,7 +69,7 @@ impl<S: Scalar> Bench<S> {
         {
             self.sent += 1;
             let last = self.sent == self.words.len();
-            self.rig.state.offer_voltage(word, last);
+            self.rig.state.push_injection(word, last);
         }
     }
 
@@ -314,7 +314,7 @@ proptest! {
         let mut left = words.iter();
         for (count, near, command) in readings {
             if rig.state.wants_voltage() && let Some(&word) = left.next() {
-                rig.state.offer_voltage(word, left.len() == 0);
+                rig.state.push_injection(word, left.len() == 0);
             }
             let place = &mut rig.inputs.readings[0].count;
             *place = if near { place.wrapping_add(count % 20) } else { count };

@@ -143,7 +143,7 @@ fn the_friction_that_the_axis_has_is_learnt_in_every_number_type() {
 fn a_friction_beyond_the_largest_scale_is_met_with_that() {
     let mut settings = learning();
     let gains = &mut settings.axes[0].feedforward.gains;
-    (gains.gms, gains.level, gains.viscous) = (0.2, 0.2, 0.2);
+    (gains.presliding, gains.level, gains.viscous) = (0.2, 0.2, 0.2);
     let mut axis = Axis::<f32>::on_sine(&settings, 1.0);
     axis.command(Command::Run);
     axis.run(20.0);
@@ -448,7 +448,7 @@ fn opened() -> Axis<f32> {
     };
     let (injection, _) = learning().injection(&request).expect("within");
     axis.rig.state.prepare_injection(injection);
-    axis.rig.state.offer_voltage(0, false);
+    axis.rig.state.push_injection(0, false);
     axis.command(Command::StartInjection);
     hold_open(&mut axis, 20, false);
     assert_eq!(axis.rig.state.axes()[0].mode(), MotionMode::OpenLoop);
@@ -459,7 +459,7 @@ fn opened() -> Axis<f32> {
 fn hold_open(axis: &mut Axis<f32>, ticks: u32, last: bool) {
     for tick in 1..=ticks {
         if axis.rig.state.wants_voltage() {
-            axis.rig.state.offer_voltage(0, last && tick == ticks);
+            axis.rig.state.push_injection(0, last && tick == ticks);
         }
         axis.tick();
     }

@@ -9,7 +9,7 @@ use quadrant_law::command::Command;
 use quadrant_law::reference::Velocity;
 use quadrant_law::safety::FaultCode;
 use quadrant_law::safety::plausibility::{
-    Plausibility, PlausibilityModel, PlausibilityState, Shown, Words,
+    OutputScale, Plausibility, PlausibilityModel, PlausibilityState, Shown,
 };
 use quadrant_law::units::DacCode;
 use quadrant_settings::StageSettings;
@@ -29,16 +29,16 @@ const FILTER_S: f64 = 10.0 * PERIOD_S;
 /// A filtered speed of 1 mm/s.
 const SPEED: f64 = PERIOD_S / COUNT_MM * 256.0;
 
-const AMPLIFIERS: [Words; 3] = [
-    Words {
+const AMPLIFIERS: [OutputScale; 3] = [
+    OutputScale {
         per_volt: DacCode::FULL_SCALE / 10.0,
         offset: 0,
     },
-    Words {
+    OutputScale {
         per_volt: DacCode::FULL_SCALE / 10.0,
         offset: 250,
     },
-    Words {
+    OutputScale {
         per_volt: -1638.35,
         offset: -40,
     },
@@ -77,7 +77,7 @@ fn model() -> PlausibilityModel {
 /// Shows comparisons until one fails; gives the time, s, at most 3.
 fn time_until_found(
     plausibility: &Plausibility,
-    words: Words,
+    words: OutputScale,
     open: bool,
     volts: impl Fn(f64) -> f64,
     motion: impl Fn(f64) -> (f64, f64),

@@ -64,7 +64,7 @@ fn the_first_motion_after_a_rest_errs_like_any_other() {
     let filtered = with(|x| {
         x.feedback.filters = FilterList::from_slice(&[FilterSettings::low_pass(900.0, 0.7)]).ok();
     });
-    let half = with(|x| x.feedforward.gains.gms = 0.9);
+    let half = with(|x| x.feedforward.gains.presliding = 0.9);
     for (what, [in_motion, after]) in [
         ("f32", errors_um::<f32>(&fixed())),
         ("fixed point", errors_um::<Fixed>(&fixed())),
@@ -146,7 +146,7 @@ fn no_more_than_friction_can_be_is_adopted() {
         axis.command(Command::Run);
         axis.run(5e-4);
         let taken = f64::from(before - axis.seen().feedback.integral).abs();
-        let gms = f64::from(axis.seen().feedforward.gms).abs();
+        let gms = f64::from(axis.seen().feedforward.presliding).abs();
         println!("{pushed_v} V: {taken:.4} V of {before:.4} V adopted, then {gms:.4} V");
         assert!(gms < 1.02 * breakaway_v && taken < 2.02 * breakaway_v && taken > 0.0);
         // The load stays the integral's, and the axis runs on.

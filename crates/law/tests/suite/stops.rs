@@ -2,7 +2,7 @@
 
 use quadrant_law::admission::{Refusal, StageView, refusal};
 use quadrant_law::axes::{AxisName, PerAxis};
-use quadrant_law::axis::{Axis, AxisBuilder};
+use quadrant_law::axis::{Axis, AxisBuilder, OutputStage};
 use quadrant_law::command::Command;
 use quadrant_law::motion::ReferenceGenerator;
 use quadrant_law::reference::{MotionScale, Ramp, Velocity};
@@ -67,7 +67,7 @@ fn settings_by_which_a_stop_would_not_end_are_refused_by_name() {
 fn endless() -> Axis<f32, 4> {
     let mut axis = Axis::blank();
     AxisBuilder::new(&mut axis, SCALE.resolution_mm, 1.0 / SCALE.rate_hz)
-        .amplifier(10.0, 10.0, 0.0, false)
+        .output(OutputStage::limited_to(10.0))
         .generator(
             ReferenceGenerator::new(
                 Ramp::new(1.0, 1e5, SCALE),

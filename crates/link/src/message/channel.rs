@@ -35,7 +35,9 @@ pub enum AxisSignal {
     /// Feedforward of viscous friction, V.
     Viscous = 8,
     /// Feedforward of the pre-sliding model, V.
-    Gms = 9,
+    // Its former name is still understood.
+    #[strum(serialize = "presliding", serialize = "gms")]
+    Presliding = 9,
     /// Feedforward of inertia, V.
     Inertia = 10,
     /// Remainder of a bumpless change's offset, V.

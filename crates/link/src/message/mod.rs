@@ -34,7 +34,7 @@ pub use motion::{
 pub use notice::{Event, Notice, OscillationKind};
 pub use observe::{
     BLOCK_BYTES, BLOCK_WORDS, CaptureRequest, CaptureStatus, MAX_CHANNELS, SERIAL_VALUES_PER_S,
-    TelemetryBlock, TelemetryRequest, WordPage, Words,
+    SampleWords, TelemetryBlock, TelemetryRequest, WordPage,
 };
 pub use settings::{
     Applied, MAX_VALUE_BYTES, PAGE_PATHS, Path, PathPage, Provenance, SettingsRequest, Value,

@@ -20,9 +20,9 @@ pub const SERIAL_VALUES_PER_S: f64 = 21_500.0;
 
 /// Words of samples, little-endian, four bytes each.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Words(Vec<u8, BLOCK_BYTES>);
+pub struct SampleWords(Vec<u8, BLOCK_BYTES>);
 
-impl Words {
+impl SampleWords {
     /// Returns an empty list.
     pub const fn new() -> Self {
         Self(Vec::new())
@@ -73,7 +73,7 @@ pub struct TelemetryBlock {
     /// Words of a sample.
     pub channels: u8,
     /// The samples, one after the other.
-    pub words: Words,
+    pub words: SampleWords,
 }
 
 impl TelemetryBlock {
@@ -149,5 +149,5 @@ pub struct WordPage {
     /// Words before the first of these.
     pub offset: u16,
     /// The words, little-endian.
-    pub words: Words,
+    pub words: SampleWords,
 }

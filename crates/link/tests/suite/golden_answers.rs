@@ -5,12 +5,12 @@ use quadrant_link::frame::FrameCounters;
 use quadrant_link::message::AxisName::{Y, Z};
 use quadrant_link::message::*;
 use quadrant_link::message::{CaptureCause, CapturePhase, CaptureRecord};
-use quadrant_link::message::{LimitedBy, MachineState, TelemetryBlock, Words};
+use quadrant_link::message::{LimitedBy, MachineState, SampleWords, TelemetryBlock};
 
 use crate::golden::{channels, flag, hex, short};
 
-fn words() -> Words {
-    let mut words = Words::new();
+fn words() -> SampleWords {
+    let mut words = SampleWords::new();
     assert!(words.extend([1, 0x0203_0405].into_iter()));
     words
 }

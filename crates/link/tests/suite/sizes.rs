@@ -11,7 +11,7 @@ use quadrant_link::message::{
     TelemetryRequest, Value, Voltages, WordPage,
 };
 use quadrant_link::message::{CaptureCause, CapturePhase, CaptureRecord, Edge, Level, Trigger};
-use quadrant_link::message::{Channel, LimitedBy, MachineState, TelemetryBlock, Words};
+use quadrant_link::message::{Channel, LimitedBy, MachineState, SampleWords, TelemetryBlock};
 use quadrant_link::message::{Harmonic, Motion, Plan};
 use quadrant_link::server::LinkServer;
 
@@ -32,8 +32,8 @@ fn long_value() -> Value {
     }
 }
 
-fn full_words() -> Words {
-    let mut words = Words::new();
+fn full_words() -> SampleWords {
+    let mut words = SampleWords::new();
     assert!(words.extend([u32::MAX; 112].into_iter()));
     assert!(!words.extend([0].into_iter()), "112 words are all");
     words

@@ -64,7 +64,7 @@ pub(super) const LEAVES: &[LeafInfo] = &[
         "Coulomb gain, share of s(v) sgn(v); 1 is the identified value."),
     number("feedforward.gains.viscous", "", at(0.0), at(2.0), 1.0,
         "Share of sigma v."),
-    number("feedforward.gains.gms", "", at(0.0), at(2.0), 1.0,
+    number("feedforward.gains.presliding", "", at(0.0), at(2.0), 1.0,
         "Share of the pre-sliding model's force, whichever model acts."),
     number("feedforward.gains.inertia_v_s2_per_mm", "V s²/mm", at(0.0), at(1.0), 0.0,
         "Inertia gain: 1 / A for the whole of it, 0 for none."),

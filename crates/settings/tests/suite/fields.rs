@@ -232,8 +232,8 @@ pub(crate) const FIELDS: &[(&str, Field, f64, f64)] = &[
         2.1,
     ),
     (
-        "feedforward.gains.gms",
-        |a| &mut a.feedforward.gains.gms,
+        "feedforward.gains.presliding",
+        |a| &mut a.feedforward.gains.presliding,
         -0.1,
         2.1,
     ),

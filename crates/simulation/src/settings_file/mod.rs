@@ -235,6 +235,26 @@ mod tests {
     }
 
     #[test]
+    fn a_setting_is_read_under_its_former_name() {
+        let text = "[[stage.axes]]\n[[stage.axes]]\nfeedforward.gains.gms = 0.75\n";
+        let gains = parse(text)
+            .unwrap()
+            .stage
+            .axes
+            .map(|axis| axis.feedforward.gains);
+        assert_eq!(gains[1].presliding, 0.75);
+        assert_eq!(
+            gains[0].presliding,
+            StageSettings::default().axes[0]
+                .feedforward
+                .gains
+                .presliding
+        );
+        let error = parse("[[stage.axes]]\nfeedforward.gms = 0.75\n").unwrap_err();
+        assert!(error.to_string().contains("x/feedforward/gms"), "{error}");
+    }
+
+    #[test]
     fn an_axis_is_exchanged_unless_the_file_is_of_another_machine() {
         let mut earlier = file();
         earlier.stage.brake.release_s = 0.2;

@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use quadrant_law::axes::AxisName;
+use quadrant_settings::path::{RENAMED, present_name};
 use quadrant_settings::tree::is_part;
 use quadrant_settings::{StageSettings, leaves};
 use serde::Serialize;
@@ -106,6 +107,36 @@ fn axes_overlaid(plain: Option<&Value>, full: &[Value], written: &[Value]) -> Ve
     axes.collect()
 }
 
+/// Gives a stage's settings their present names where a file has former ones.
+fn rename(stage: &mut Table) {
+    fn below<'a>(table: &'a mut Table, parts: &[&str]) -> Option<&'a mut Table> {
+        let next = |table: &'a mut Table, part: &&str| table.get_mut(*part)?.as_table_mut();
+        parts.iter().try_fold(table, next)
+    }
+    let axes = stage.get_mut(AXES).and_then(Value::as_array_mut);
+    for axis in axes.into_iter().flatten().filter_map(Value::as_table_mut) {
+        for (former, present) in RENAMED {
+            let [former, present] = [former, present].map(|path| path[1..].rsplit_once('/'));
+            let (Some((part, former)), Some((_, present))) = (former, present) else {
+                continue;
+            };
+            let part: Vec<&str> = part.split('/').collect();
+            if let Some(table) = below(axis, &part)
+                && let Some(value) = table.remove(former)
+            {
+                table.entry(present).or_insert(value);
+            }
+        }
+    }
+}
+
+/// The present key of a value that is shown as `shown`: `x/feedforward/gains/presliding` is `presliding`.
+fn present_key(shown: &str) -> &str {
+    let below = shown.find('/').map_or(shown, |axis| &shown[axis..]);
+    let present = present_name(below);
+    present.rsplit_once('/').map_or(present, |(_, key)| key)
+}
+
 /// The part of `value` that differs from `plain`, or from `full` where a part of it is not there by default.
 fn differing(value: &Table, plain: Option<&Table>, full: &Table) -> Table {
     let base = plain.unwrap_or(full);
@@ -164,7 +195,7 @@ impl Walk<'_> {
         for (key, value) in spans {
             let (name, line) = (key.get_ref().as_ref(), line(self.text, key.span().start));
             let shown = format!("{shown}{name}");
-            let Some(known) = full.get(name) else {
+            let Some(known) = full.get(present_key(&shown)) else {
                 return Err(SettingsFileError::Unknown {
                     path: self.path.to_owned(),
                     line,
@@ -233,10 +264,11 @@ pub(super) fn parsed<File: DeserializeOwned>(
             });
         }
     }
-    let Some(Value::Table(stage)) = written.get(STAGE) else {
+    let Some(Value::Table(stage)) = written.get_mut(STAGE) else {
         // Its message says what is missing.
         return Ok(toml::from_str(text).map_err(syntax)?);
     };
+    rename(stage);
     if let Some(count) = axes_of(stage).filter(|count| *count > AxisName::ALL.len()) {
         return Err(SettingsFileError::Axes {
             path: path.to_owned(),

@@ -5,7 +5,7 @@ use quadrant::app::Translated;
 use quadrant::app::telemetry::{Packer, Selection};
 use quadrant::link::message::*;
 use quadrant::link::message::{CaptureCause, CapturePhase, CaptureRecord};
-use quadrant::link::message::{LimitedBy, MachineState, Words};
+use quadrant::link::message::{LimitedBy, MachineState, SampleWords};
 use quadrant_settings::{MAX_VALUE_BYTES, StageSettings};
 
 use super::{Model, ROOM, read};
@@ -257,7 +257,7 @@ impl Model {
                 let channels = selection.channels();
                 let from = usize::from(offset);
                 let all = SAMPLES as usize * channels.len();
-                let mut words = Words::new();
+                let mut words = SampleWords::new();
                 assert!(words.extend((from..all.min(from + 112)).map(|place| {
                     read(
                         channels[place % channels.len()],
