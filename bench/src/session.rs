@@ -213,7 +213,7 @@ pub fn channels() -> Value {
 #[cfg(test)]
 mod tests {
     use quadrant::link::message::{
-        AxisName, AxisSignal, Event, MAX_CHANNELS, Response, TelemetryBlock, Words,
+        AxisName, AxisSignal, Event, MAX_CHANNELS, Response, SampleWords, TelemetryBlock,
     };
     use quadrant::link::server::LinkServer;
 
@@ -264,7 +264,7 @@ mod tests {
             selected["ok"]["channels"],
             json!([{"name": "x.error", "unit": "um"}, {"name": "y.position", "unit": "mm"}])
         );
-        let mut words = Words::new();
+        let mut words = SampleWords::new();
         assert!(words.extend([0.002_f32.to_bits(), 2000, 0.003_f32.to_bits(), 2001].into_iter()));
         let block = |generation| {
             bytes(&Message::Notice(Notice::Telemetry(TelemetryBlock {
