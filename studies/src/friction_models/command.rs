@@ -4,13 +4,13 @@ use clap::Args;
 use quadrant_cli::axis::Axis;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, command_line, progress};
-use quadrant_sim::pages::provenance;
+use quadrant_cli::say;
+use quadrant_pages::parts::provenance;
 
 use crate::friction_models::page::{
     friction_models_page, friction_models_table, friction_parameters_table, tracking_table,
 };
 use crate::friction_models::{Model, Parameters, compare, tracking};
-use quadrant_cli::say;
 
 /// Options of `quadrant-studies friction`.
 #[derive(Clone, Debug, Args)]

@@ -1,8 +1,8 @@
 //! The friction models side by side: table and page.
 
 use quadrant_law::feedforward::FeedforwardKind;
-use quadrant_sim::pages::{UM_PER_MM, columns, lines, series};
-use quadrant_sim::report::{
+use quadrant_pages::parts::{UM_PER_MM, columns, lines, series};
+use quadrant_report::{
     Block, Cell, Column, Figure, Page, Provenance, Section, Series, Style, Table,
 };
 

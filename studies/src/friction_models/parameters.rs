@@ -4,8 +4,8 @@ use quadrant_law::friction::FrictionSettings;
 use quadrant_law::friction::dahl::DahlParameters;
 use quadrant_law::friction::lugre::LugreParameters;
 use quadrant_settings::AxisSettings;
-use quadrant_sim::identify::single_state::{presliding_range_mm, with_all_models};
 use quadrant_sim::plant::{AxisParameters, Drive, FrictionParameters, Imperfections};
+use quadrant_tune::identify::single_state::{presliding_range_mm, with_all_models};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Model {

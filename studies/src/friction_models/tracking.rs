@@ -4,15 +4,16 @@
 use indicatif::ProgressBar;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_pages::compare::sine::run_configuration;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
 use quadrant_settings::AxisSettings;
-use quadrant_sim::compare::sine::run_configuration;
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::metrics::Score;
-use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
-use quadrant_sim::identify::single_state::with_all_models;
+use quadrant_sim::identified_stage::identified_settings;
+use quadrant_sim::metrics::Score;
 use quadrant_sim::plant::{AxisParameters, FrictionParameters, StageParameters};
+use quadrant_sim::run::RunError;
 use quadrant_sim::settings_file::SettingsFileError;
+use quadrant_tune::identify::single_state::with_all_models;
 use rayon::prelude::*;
 
 use crate::friction_models::Model;

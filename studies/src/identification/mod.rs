@@ -8,9 +8,9 @@ pub mod page;
 
 use indicatif::ProgressBar;
 use quadrant_settings::StageSettings;
-use quadrant_sim::commission::{CommissionError, CommissionSettings, Commissioned, commission};
-use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::{AxisParameters, StageParameters};
+use quadrant_tune::commission::{CommissionError, CommissionSettings, Commissioned, commission};
+use quadrant_tune::test_axis::SimulatedTestAxis;
 use rayon::prelude::*;
 
 /// Encoder noise of the runs, over that of the simulated stage.

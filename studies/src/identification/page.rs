@@ -1,7 +1,7 @@
 //! The table of an identification judged by the truth.
 
-use quadrant_sim::pages::columns;
-use quadrant_sim::report::{Cell, Table};
+use quadrant_pages::parts::columns;
+use quadrant_report::{Cell, Table};
 
 use crate::identification::{Estimate, Judged, Judgement};
 

@@ -4,13 +4,13 @@ use clap::Args;
 use quadrant_cli::axis::Axis;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, command_line, share};
-use quadrant_sim::pages::provenance;
-use quadrant_sim::report::{Block, Page};
+use quadrant_cli::say;
+use quadrant_pages::parts::provenance;
+use quadrant_report::{Block, Page};
 
 use crate::laws::page::laws_section;
 use crate::laws::study::run_study;
 use crate::wrong_model::page::wrong_model_section;
-use quadrant_cli::say;
 
 /// Options of `quadrant-studies laws`.
 #[derive(Clone, Debug, Args)]

@@ -2,11 +2,11 @@
 
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_pages::experiment::statistic::Statistic;
 use quadrant_settings::AxisSettings;
-use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::sine_test::{SineTest, SineTestOutcome, run_sine_tests};
-use quadrant_sim::experiment::statistic::Statistic;
 use quadrant_sim::plant::AxisParameters;
+use quadrant_sim::run::RunError;
+use quadrant_sim::sine_test::{SineTest, SineTestOutcome, run_sine_tests};
 use rayon::prelude::*;
 
 use crate::laws::tuning::TunedLaw;

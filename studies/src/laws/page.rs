@@ -2,12 +2,11 @@
 
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
-use quadrant_sim::experiment::sine_test::SineTestOutcome;
-use quadrant_sim::pages::{UM_PER_MM, columns, dot, lines, series, statistic_cells};
-use quadrant_sim::report;
-use quadrant_sim::report::{
-    Block, Cell, Colour, DotSeries, Dots, Figure, Plot, Scale, Section, Style, Table,
+use quadrant_pages::parts::{UM_PER_MM, columns, dot, lines, series, statistic_cells};
+use quadrant_report::{
+    Block, Cell, Colour, DotSeries, Dots, Figure, Plot, Scale, Section, Spread, Style, Table,
 };
+use quadrant_sim::sine_test::SineTestOutcome;
 
 use crate::laws::comparison::LawOutcome;
 use crate::laws::tuning::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK, TunedLaw};
@@ -153,9 +152,7 @@ fn laws_figure(outcomes: &[LawOutcome]) -> Figure {
             .iter()
             .find(|outcome| outcome.law.name() == law && outcome.feedforward == kind);
         let errors = of.map(|outcome| outcome.statistic(|o| o.score.rms_mm));
-        errors.map_or(report::Spread::exact(f64::NAN), |errors| {
-            dot(errors, UM_PER_MM)
-        })
+        errors.map_or(Spread::exact(f64::NAN), |errors| dot(errors, UM_PER_MM))
     };
     let series = [
         ("no feedforward", FeedforwardKind::None, Colour::Vermillion),

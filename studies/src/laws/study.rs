@@ -2,12 +2,12 @@
 
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_settings::StageSettings;
-use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::identify::characteristic::{
+use quadrant_sim::plant::StageParameters;
+use quadrant_sim::run::RunError;
+use quadrant_tune::identify::characteristic::{
     CharacteristicError, CharacteristicSettings, measure,
 };
-use quadrant_sim::machine::SimulatedTestAxis;
-use quadrant_sim::plant::StageParameters;
+use quadrant_tune::test_axis::SimulatedTestAxis;
 
 use crate::laws::comparison::{LawOutcome, compare_laws};
 use crate::laws::tuning::{TunedLaw, TuningError, tune_all};

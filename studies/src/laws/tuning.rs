@@ -10,13 +10,14 @@ use quadrant_law::control::surface::SurfaceGains;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_settings::popov::sector_bound;
 use quadrant_settings::{AxisSettings, FeedbackSettings};
-use quadrant_sim::design::{
-    DesignError, Form, Margins, PidDesign, PidRequest, Process, Target, design_pid,
-};
-use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::sine_test::{SineTest, run_sine_tests};
-use quadrant_sim::identify::characteristic::Characteristic;
+use quadrant_sim::margins::Margins;
 use quadrant_sim::plant::{AxisParameters, Drive, FrictionParameters, Imperfections};
+use quadrant_sim::run::RunError;
+use quadrant_sim::sine_test::{SineTest, run_sine_tests};
+use quadrant_tune::design::{
+    DesignError, Form, PidDesign, PidRequest, Process, Target, design_pid,
+};
+use quadrant_tune::identify::characteristic::Characteristic;
 use rayon::prelude::*;
 
 /// Bounds that every law keeps at small errors.
@@ -74,7 +75,7 @@ pub enum TuningError {
     #[error("the tuned {law} cannot be judged: {source}")]
     Margins {
         law: &'static str,
-        source: quadrant_sim::design::MarginError,
+        source: quadrant_sim::margins::MarginError,
     },
     /// No candidate is left.
     #[error("no setting of {law} keeps the bounds on this axis")]

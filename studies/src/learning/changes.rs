@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
+use quadrant_report::{Cell, Column, Table};
 use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::plant::AxisParameters;
 use quadrant_sim::plant::load::{Force, Load};
-use quadrant_sim::report::{Cell, Column, Table};
 use rayon::prelude::*;
 
 use super::run::{Friction, Nothing, Phase, SINE, cycle_s, run};

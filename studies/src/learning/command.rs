@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::Output;
 use quadrant_cli::say;
-use quadrant_sim::report::{Block, Section};
+use quadrant_report::{Block, Section};
 
 use super::{changes, cuts, figures, known, parts, recorded, starts};
 

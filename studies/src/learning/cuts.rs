@@ -2,11 +2,11 @@
 
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::plant_model::PlantModel;
+use quadrant_report::{Cell, Column, Table};
 use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::Load;
 use quadrant_sim::plant::{AxisParameters, NEWTONS_PER_VOLT};
-use quadrant_sim::report::{Cell, Column, Table};
 use rayon::prelude::*;
 
 use super::remedies::{FedFriction, Observer};

@@ -1,10 +1,10 @@
 //! The study's figures: the scale settling after a step of friction, and a slot with and without.
 
+use quadrant_report::{Figure, Lines, Plot, Series, Style, decimate};
 use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::plant::NEWTONS_PER_VOLT;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::Load;
-use quadrant_sim::report::{Figure, Lines, Plot, Series, Style, decimate};
 
 use super::run::{Friction, Nothing, Phase, SINE, Trace, cycle_s, run};
 use super::starts::nominal;

@@ -1,7 +1,7 @@
 //! The error that is left where the feedforward knows the friction: as identified and scaled by hand, and the simulated axis' own.
 
+use quadrant_report::{Cell, Column, Table};
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::report::{Cell, Column, Table};
 use rayon::prelude::*;
 
 use super::run::{Friction, Nothing, Phase, SINE, cycle_s, run};

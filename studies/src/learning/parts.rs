@@ -2,15 +2,15 @@
 
 use std::fmt::Write as _;
 
+use quadrant_gcode::{Limits, Program, Trajectory};
 use quadrant_law::control::feedback::LawKind;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
+use quadrant_pages::replay::part_program::{ProgramTables, run_program};
+use quadrant_report::{Cell, Column, Table};
 use quadrant_settings::StageSettings;
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::metrics::{largest, rms};
-use quadrant_sim::experiment::run_configuration::RunConfiguration;
-use quadrant_sim::gcode::{Limits, Program, Trajectory};
+use quadrant_sim::metrics::{largest, rms};
 use quadrant_sim::plant::StageParameters;
-use quadrant_sim::replay::part_program::{ProgramTables, run_program};
-use quadrant_sim::report::{Cell, Column, Table};
 use rayon::prelude::*;
 
 use super::run::Friction;

@@ -9,15 +9,15 @@ use std::sync::Arc;
 
 use anyhow::Context;
 use quadrant_law::reference::{MotionScale, RecordedTable};
+use quadrant_pages::replay::recorded::{Axis, emps_axis, recorded_motion};
+use quadrant_report::{Cell, Column, Table};
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::identify::motion::{
-    MotionFitSettings, MotionModel, Signals, fit_motion, recommended,
-};
 use quadrant_sim::plant::AxisParameters;
 use quadrant_sim::plant::load::{Force, Load};
-use quadrant_sim::record::Recording;
-use quadrant_sim::replay::recorded::{Axis, emps_axis, recorded_motion};
-use quadrant_sim::report::{Cell, Column, Table};
+use quadrant_tune::identify::motion::{
+    MotionFitSettings, MotionModel, Signals, fit_motion, recommended,
+};
+use quadrant_tune::record::Recording;
 use rayon::prelude::*;
 
 use super::run::{Friction, Nothing, Phase, run};

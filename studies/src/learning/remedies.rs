@@ -1,7 +1,6 @@
 //! Remedies against a cut, tried beside the law: a disturbance observer, and a friction model fed with the measured
 //! vibration. Each adds a voltage to the law's output.
 
-use quadrant_settings::response::LinearResponse;
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
@@ -11,7 +10,8 @@ use quadrant_law::friction::Direction;
 use quadrant_law::friction::gms::{FIRMWARE_ELEMENTS, Gms, GmsState};
 use quadrant_law::friction::stribeck::SlidingTable;
 use quadrant_settings::AxisSettings;
-use quadrant_sim::design::{OpenLoop, SampledLoop};
+use quadrant_settings::response::LinearResponse;
+use quadrant_sim::loop_shape::{OpenLoop, SampledLoop};
 
 use super::run::Addition;
 

@@ -12,11 +12,10 @@ use quadrant_law::safety::SafetyState;
 use quadrant_law::units::DacCode;
 use quadrant_settings::Job;
 use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
-use quadrant_sim::experiment::configuration::ELEMENTS;
-use quadrant_sim::machine::LawMachine;
-use quadrant_sim::machine::law::TickInput;
+use quadrant_sim::law_machine::{LawMachine, TickInput};
 use quadrant_sim::plant::load::Load;
 use quadrant_sim::plant::{AxisParameters, SimulatedAxis};
+use quadrant_sim::run::ELEMENTS;
 
 /// The feedforward of a competitor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

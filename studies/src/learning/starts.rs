@@ -1,9 +1,9 @@
 //! Learning that begins with the wrong friction: gains of the settings, a history, and values of a catalogue.
 
 use quadrant_law::friction::gms::{GmsElement, GmsElements, GmsParameters};
+use quadrant_report::{Cell, Column, Table};
 use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::plant::{AxisParameters, StageParameters};
-use quadrant_sim::report::{Cell, Column, Table};
 use rayon::prelude::*;
 
 use super::run::{Friction, Nothing, Phase, SINE, cycle_s, run};

@@ -2,7 +2,8 @@
 
 use clap::Args;
 use quadrant_cli::output::{Output, progress};
-use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
+use quadrant_sim::identified_stage::identified_settings;
 
 use crate::numerics;
 use crate::numerics::page::numerics_table;

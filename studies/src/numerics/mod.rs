@@ -9,12 +9,11 @@ pub mod page;
 
 use indicatif::ProgressBar;
 use quadrant_law::scalar::{Fixed, Scalar};
-use quadrant_sim::compare::sine::{Bench, Outcome, Sines, run_configuration};
-use quadrant_sim::experiment::configuration::{Configuration, ELEMENTS};
-use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::run_configuration::RunConfiguration;
-use quadrant_sim::machine::LawMachine;
-use quadrant_sim::machine::law::TickInput;
+use quadrant_pages::compare::sine::{Bench, Outcome, Sines, run_configuration};
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
+use quadrant_sim::law_machine::{LawMachine, TickInput};
+use quadrant_sim::run::{ELEMENTS, RunError};
 use rayon::prelude::*;
 
 /// Deviation of a number type from `f64`: the worst over all velocities and both kinds of model knowledge.

@@ -1,7 +1,7 @@
 //! The table of the number types.
 
-use quadrant_sim::pages::UM_PER_MM;
-use quadrant_sim::report::{Cell, Column, Table};
+use quadrant_pages::parts::UM_PER_MM;
+use quadrant_report::{Cell, Column, Table};
 
 use crate::numerics::{Deviation, Numerics};
 

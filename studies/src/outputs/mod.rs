@@ -5,10 +5,10 @@ pub mod command;
 pub mod page;
 
 use quadrant_law::noise_shaper::NoiseShaper;
-use quadrant_sim::compare::sine::{Bench, Outcome, Sines, run_bench};
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::run_configuration::RunConfiguration;
+use quadrant_pages::compare::sine::{Bench, Outcome, Sines, run_bench};
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
+use quadrant_sim::run::RunError;
 use rayon::prelude::*;
 
 /// Conversion of codes to volts.

@@ -1,8 +1,8 @@
 //! The table of the outputs.
 
-use quadrant_sim::compare::sine::VELOCITIES_MM_S;
-use quadrant_sim::pages::UM_PER_MM;
-use quadrant_sim::report::{Cell, Column, Table};
+use quadrant_pages::compare::sine::VELOCITIES_MM_S;
+use quadrant_pages::parts::UM_PER_MM;
+use quadrant_report::{Cell, Column, Table};
 
 use crate::outputs::OutputRun;
 

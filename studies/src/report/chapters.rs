@@ -1,9 +1,9 @@
 //! The headlines, and chapter 5.
 
-use quadrant_sim::compare::comparison::Request;
-use quadrant_sim::compare::sine::Sines;
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::report::Section;
+use quadrant_pages::compare::comparison::Request;
+use quadrant_pages::compare::sine::Sines;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_report::Section;
 
 use crate::report::{Context, Progress};
 use crate::thesis::chapter5::chapter5_sections;

@@ -4,10 +4,10 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, share};
-use quadrant_sim::report::{Block, Page, Table};
+use quadrant_cli::{say, warn};
+use quadrant_report::{Block, Page, Table};
 
 use crate::report::{Context, Done, PARTS, Part, Request, compute};
-use quadrant_cli::{say, warn};
 
 /// Options of `quadrant-studies report`.
 #[derive(Clone, Debug, Args)]

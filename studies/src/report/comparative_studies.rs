@@ -2,12 +2,12 @@
 //! drives; and the circle as machine builders know it.
 
 use indicatif::ProgressBar;
-use quadrant_sim::circle::page::circle_sections;
-use quadrant_sim::circle::{CircleRequest, run_circle_tests};
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::RunConfiguration;
-use quadrant_sim::machine::BUILT_IN_STAGE;
-use quadrant_sim::report::Section;
+use quadrant_pages::circle::page::circle_sections;
+use quadrant_pages::circle::{CircleRequest, run_circle_tests};
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
+use quadrant_report::Section;
+use quadrant_sim::stage_setup::BUILT_IN_STAGE;
 
 use crate::friction_models::page::friction_models_sections;
 use crate::friction_models::{Parameters, compare, tracking};

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use quadrant_cli::law_settings::LawSettings;
-use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Comparison, Request};
-use quadrant_sim::compare::sine::Sines;
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::RunConfiguration;
-use quadrant_sim::pages::provenance;
-use quadrant_sim::report::Provenance;
+use quadrant_pages::compare::comparison::{AMPLITUDES_MM, Comparison, Request};
+use quadrant_pages::compare::sine::Sines;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
+use quadrant_pages::parts::provenance;
+use quadrant_report::Provenance;
 use quadrant_sim::settings_file::SettingsFile;
 
 /// Inputs that the parts of a report share.

@@ -2,18 +2,18 @@
 
 use anyhow::Context as _;
 use quadrant_law::control::plant_model::PlantModel;
+use quadrant_pages::design::npid::NonlinearPage;
+use quadrant_pages::design::pid::PidPage;
+use quadrant_report::Section;
 use quadrant_settings::StageSettings;
-use quadrant_sim::commission::{CommissionSettings, CrossCheck, commission};
-use quadrant_sim::design::npid::filtered_proof;
-use quadrant_sim::design::pages::npid::NonlinearPage;
-use quadrant_sim::design::pages::pid::PidPage;
-use quadrant_sim::design::robustness::{Uncertainty, robustness};
-use quadrant_sim::design::step_response::{StepRequest, step_response};
-use quadrant_sim::design::time_varying::VaryingLoop;
-use quadrant_sim::design::{Form, Process, best_pid};
-use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::StageParameters;
-use quadrant_sim::report::Section;
+use quadrant_tune::commission::{CommissionSettings, CrossCheck, commission};
+use quadrant_tune::design::npid::filtered_proof;
+use quadrant_tune::design::robustness::{Uncertainty, robustness};
+use quadrant_tune::design::step_response::{StepRequest, step_response};
+use quadrant_tune::design::time_varying::VaryingLoop;
+use quadrant_tune::design::{Form, Process, best_pid};
+use quadrant_tune::test_axis::SimulatedTestAxis;
 
 use crate::report::{Context, Progress};
 use crate::thesis::chapter3::chapter3_sections;

@@ -13,7 +13,7 @@ mod store;
 
 use std::path::PathBuf;
 
-use quadrant_sim::report::Section;
+use quadrant_report::Section;
 
 pub use context::Context;
 pub use progress::Progress;

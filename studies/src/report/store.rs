@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use anyhow::Context as _;
-use quadrant_sim::report::{Section, whole};
+use quadrant_report::Section;
+use quadrant_written::whole;
 use serde::{Deserialize, Serialize};
 
 use crate::report::Context;

@@ -7,14 +7,14 @@ use clap::Args;
 use quadrant_cli::axis::Axis;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, command_line, progress};
-use quadrant_sim::pages::provenance;
+use quadrant_cli::say;
+use quadrant_pages::parts::provenance;
+use quadrant_report::Page;
 use quadrant_sim::plant::cutting::{Component, Milling};
-use quadrant_sim::record::{ForceRecord, write_trace};
-use quadrant_sim::report::Page;
+use quadrant_tune::record::{ForceRecord, write_trace};
 
 use crate::robustness::page::{robustness_full_table, robustness_sections, robustness_tables};
 use crate::robustness::study::{StudyRequest, names, run_study, runs};
-use quadrant_cli::say;
 
 /// Options of `quadrant-studies robustness`.
 #[derive(Clone, Debug, Args)]

@@ -1,6 +1,5 @@
 //! Compliance of the axis at rest to a sinusoidal load: by the loop's linear model, and of the simulated axis.
 
-use quadrant_settings::response::LinearResponse;
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
@@ -8,8 +7,9 @@ use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::plant_model::PlantModel;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant_settings::response::LinearResponse;
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::design::{OpenLoop, SampledLoop};
+use quadrant_sim::loop_shape::{OpenLoop, SampledLoop};
 use quadrant_sim::plant::load::Load;
 use quadrant_sim::plant::{AxisParameters, Imperfections};
 use rayon::prelude::*;

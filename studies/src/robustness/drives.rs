@@ -1,9 +1,9 @@
 //! The axis on other drives, each with a controller that was designed for it in the same way: by commissioning it.
 
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::commission::{CommissionError, CommissionSettings, commission};
-use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::{AxisParameters, EncoderSide, StageParameters};
+use quadrant_tune::commission::{CommissionError, CommissionSettings, commission};
+use quadrant_tune::test_axis::SimulatedTestAxis;
 use rayon::prelude::*;
 
 use crate::robustness::Scenario;

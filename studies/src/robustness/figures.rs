@@ -1,7 +1,7 @@
 //! The robustness experiment's figures.
 
-use quadrant_sim::pages::{UM_PER_MM, dot, error_curve};
-use quadrant_sim::report::{DotSeries, Dots, Figure, Lines, Plot, Scale, Series, Spread, Style};
+use quadrant_pages::parts::{UM_PER_MM, dot, error_curve};
+use quadrant_report::{DotSeries, Dots, Figure, Lines, Plot, Scale, Series, Spread, Style};
 
 use crate::robustness::compliance::{Compliance, FREQUENCIES_HZ, LOAD_V};
 use crate::robustness::study::RobustnessReport;

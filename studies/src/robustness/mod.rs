@@ -19,11 +19,11 @@ use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::learning::LearningSettings;
 use quadrant_law::safety::Fault;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::statistic::Statistic;
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::metrics::Score;
-use quadrant_sim::experiment::run::AxisTrace;
-use quadrant_sim::experiment::statistic::Statistic;
+use quadrant_sim::metrics::Score;
+use quadrant_sim::run::AxisTrace;
 use rayon::prelude::*;
 
 pub use error::RobustnessError;

@@ -1,8 +1,8 @@
 //! The robustness experiment's tables and figures.
 
-use quadrant_sim::experiment::metrics::{Metric, Score, change_percent};
-use quadrant_sim::pages::{UM_PER_MM, statistic_cells};
-use quadrant_sim::report::{Block, Cell, Column, Section, Table};
+use quadrant_pages::parts::{UM_PER_MM, statistic_cells};
+use quadrant_report::{Block, Cell, Column, Section, Table};
+use quadrant_sim::metrics::{Metric, Score, change_percent};
 
 use crate::robustness::compliance::{Compliance, FREQUENCIES_HZ, LOAD_V};
 use crate::robustness::figures::{compliance_figure, dots, error_figure};

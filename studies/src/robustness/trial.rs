@@ -4,16 +4,14 @@ use std::f64::consts::TAU;
 
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant_law::safety::{Fault, SafetyState};
+use quadrant_pages::compare::sine::AMPLITUDE_MM;
 use quadrant_settings::Job;
 use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
-use quadrant_sim::compare::sine::AMPLITUDE_MM;
-use quadrant_sim::experiment::configuration::ELEMENTS;
-use quadrant_sim::experiment::metrics::{Score, largest, rms, score};
-use quadrant_sim::experiment::run::AxisTrace;
-use quadrant_sim::machine::law::TickInput;
-use quadrant_sim::machine::{LawMachine, Operator};
+use quadrant_sim::law_machine::{LawMachine, Operator, TickInput};
+use quadrant_sim::metrics::{Score, largest, rms, score};
 use quadrant_sim::plant::load::Load;
 use quadrant_sim::plant::{AxisParameters, SimulatedAxis};
+use quadrant_sim::run::{AxisTrace, ELEMENTS};
 
 use crate::robustness::RobustnessError;
 

@@ -1,13 +1,13 @@
 //! Chapter 4 of the thesis on our stage: the controllers, and what the runs of chapter 5 are made of.
 
+use quadrant_pages::compare::comparison::AMPLITUDES_MM;
+use quadrant_pages::compare::sine::{CYCLES, SCORED_CYCLES, VELOCITIES_MM_S, cycle_s};
+use quadrant_pages::design::npid::NonlinearPage;
+use quadrant_pages::design::pid::PidPage;
+use quadrant_pages::parts::{columns, provenance};
+use quadrant_report::{Block, Cell, Section, Table};
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::compare::comparison::AMPLITUDES_MM;
-use quadrant_sim::compare::sine::{CYCLES, SCORED_CYCLES, VELOCITIES_MM_S, cycle_s};
-use quadrant_sim::design::pages::npid::NonlinearPage;
-use quadrant_sim::design::pages::pid::PidPage;
-use quadrant_sim::pages::{columns, provenance};
 use quadrant_sim::plant::AxisParameters;
-use quadrant_sim::report::{Block, Cell, Section, Table};
 
 use crate::thesis::numbers::{Number, number};
 

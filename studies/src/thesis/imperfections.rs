@@ -2,17 +2,18 @@
 //! PID with N-PID and combined feedforward is run again. The plant is not tuned; only what is asked about is changed.
 
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_pages::compare::comparison::{Comparison, Request};
+use quadrant_pages::compare::sine::Sines;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
 use quadrant_settings::SettingsError;
-use quadrant_sim::commission::bootstrap::low_bandwidth_settings;
-use quadrant_sim::compare::comparison::{Comparison, Request};
-use quadrant_sim::compare::sine::Sines;
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::run_configuration::RunConfiguration;
-use quadrant_sim::identify::virgin_curve;
-use quadrant_sim::identify::virgin_curve::{Knots, VirginCurveError, VirginCurveSettings};
-use quadrant_sim::machine::{ExperimentError, MachineError, SimulatedTestAxis, TestAxis, approach};
 use quadrant_sim::plant::Imperfections;
+use quadrant_sim::run::RunError;
+use quadrant_tune::commission::bootstrap::low_bandwidth_settings;
+use quadrant_tune::identify::virgin_curve::{self, Knots, VirginCurveError, VirginCurveSettings};
+use quadrant_tune::test_axis::{
+    ExperimentError, MachineError, SimulatedTestAxis, TestAxis, approach,
+};
 use rayon::prelude::*;
 
 /// Elements of the GMS models that are identified: up to the firmware's room. From nine on the search for the

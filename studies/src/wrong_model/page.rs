@@ -1,8 +1,8 @@
 //! "A well-tuned PID is as good": the answer, in tables and figures.
 
-use quadrant_sim::experiment::sine_test::SineTestOutcome;
-use quadrant_sim::pages::{UM_PER_MM, columns, lines, series};
-use quadrant_sim::report::{Block, Cell, Column, Figure, Section, Series, Style, Table};
+use quadrant_pages::parts::{UM_PER_MM, columns, lines, series};
+use quadrant_report::{Block, Cell, Column, Figure, Section, Series, Style, Table};
+use quadrant_sim::sine_test::SineTestOutcome;
 
 use crate::wrong_model::{Competitor, SHARES, Wrong, WrongOutcome};
 

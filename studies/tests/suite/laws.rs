@@ -2,14 +2,14 @@
 
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
-use quadrant_sim::design::{Form, Process};
-use quadrant_sim::experiment::run_configuration::identified_settings;
-use quadrant_sim::identify::characteristic::{CharacteristicSettings, measure};
-use quadrant_sim::machine::SimulatedTestAxis;
+use quadrant_sim::identified_stage::identified_settings;
 use quadrant_sim::plant::StageParameters;
 use quadrant_studies::laws::comparison::compare_laws;
 use quadrant_studies::laws::tuning::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK, TunedLaw, tune_all};
 use quadrant_studies::wrong_model::{Competitor, Wrong, feedback, with_wrong_model};
+use quadrant_tune::design::{Form, Process};
+use quadrant_tune::identify::characteristic::{CharacteristicSettings, measure};
+use quadrant_tune::test_axis::SimulatedTestAxis;
 
 fn tuned() -> (quadrant_settings::AxisSettings, Vec<TunedLaw>) {
     let settings = identified_settings().unwrap().stage.axes[0].clone();

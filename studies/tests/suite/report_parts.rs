@@ -5,7 +5,7 @@ use std::path::Path;
 
 use indicatif::ProgressBar;
 use quadrant_cli::law_settings::LawSettings;
-use quadrant_sim::report::{Block, Cell as TableCell, Column, Page, Section, Table};
+use quadrant_report::{Block, Cell as TableCell, Column, Page, Section, Table};
 use quadrant_studies::report::{Context, Part, Progress, Request, compute};
 
 thread_local! {

@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use quadrant_law::safety::FaultCode;
+use quadrant_pages::compare::sine::run_configuration;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
 use quadrant_settings::StageSettings;
-use quadrant_sim::compare::sine::run_configuration;
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
+use quadrant_sim::identified_stage::identified_settings;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::{Force, Load};
 use quadrant_sim::plant::{NEWTONS_PER_VOLT, StageParameters};
-use quadrant_sim::record::ForceRecord;
 use quadrant_studies::robustness::compliance::{
     FREQUENCIES_HZ, frictionless, linear_compliance, pid_alone, simulated_compliance,
 };
@@ -18,6 +18,7 @@ use quadrant_studies::robustness::{
     RobustnessOutcome, RobustnessRequest, Task, baseline, find, run_robustness, scenarios,
     usual_competitors,
 };
+use quadrant_tune::record::ForceRecord;
 
 fn stage() -> StageSettings {
     identified_settings().unwrap().stage
