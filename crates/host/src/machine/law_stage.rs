@@ -112,6 +112,8 @@ impl Machine for LawStage {
     }
 
     fn store(&mut self, _: &str) -> Result<(), MachineError> {
-        Err(MachineError::NoFlash)
+        let reason =
+            "the control law alone has no flash to store settings in: take another --machine";
+        Err(MachineError::Connection(reason.into()))
     }
 }

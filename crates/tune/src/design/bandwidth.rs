@@ -3,10 +3,10 @@
 use std::f64::consts::TAU;
 
 use quadrant_law::control::pid::PidGains;
+use quadrant_sim::loop_shape::OpenLoop;
+use quadrant_sim::margins::{LoopGains, Margins};
 
 use super::form::Form;
-use super::loop_shape::OpenLoop;
-use super::margins::{LoopGains, Margins};
 use super::process::Process;
 use super::shaping::{LARGEST_RATIO, SMALLEST_RATIO, ShapingError, proportional_derivative};
 

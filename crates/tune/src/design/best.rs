@@ -6,9 +6,9 @@ use num_complex::Complex64;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::pid::PidGains;
 use quadrant_settings::{AxisSettings, StageSettings};
+use quadrant_sim::loop_shape::OpenLoop;
 
 use super::form::Form;
-use super::loop_shape::OpenLoop;
 use super::pid::{DesignError, PidDesign, PidRequest, Target, design_pid};
 use super::process::Process;
 use super::search::{BOUND_RESERVES, Search};

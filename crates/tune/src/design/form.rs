@@ -3,8 +3,7 @@
 use num_complex::Complex64;
 use quadrant_law::control::pid::PidGains;
 use quadrant_settings::response::LinearResponse;
-
-use super::loop_shape::controller_response;
+use quadrant_sim::loop_shape::controller_response;
 
 /// Form in which a loop is closed.
 #[derive(Clone, Copy, Debug, PartialEq)]

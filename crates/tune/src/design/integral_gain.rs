@@ -5,9 +5,9 @@
 //! written down and found again.
 
 use quadrant_law::control::{pid::PidGains, plant_model::PlantModel};
+use quadrant_sim::margins::Margins;
 
 use super::form::Form;
-use super::margins::Margins;
 use super::process::Process;
 
 /// Most halvings between a gain that is acceptable and one that is not.
@@ -103,7 +103,7 @@ pub fn largest_integral_gain(
 /// ```
 /// # use quadrant_law::control::pid::PidGains;
 /// # use quadrant_settings::presets::{X_GAINS, X_PLANT};
-/// # use crate::design::{Form, Process, largest_integral_gain_where};
+/// # use quadrant_tune::design::{Form, Process, largest_integral_gain_where};
 /// # let gains = PidGains { ki_v_per_mm_s: 0.0, ..X_GAINS };
 /// let process = Process::Model(X_PLANT);
 /// let without = process.margins(&gains, Form::Continuous)?;

@@ -5,9 +5,9 @@ use std::f64::consts::{PI, TAU};
 use num_complex::Complex64;
 use quadrant_law::control::pid::PidGains;
 use quadrant_settings::response::LinearResponse;
+use quadrant_sim::loop_shape::{OpenLoop, controller_response};
 
 use super::form::Form;
-use super::loop_shape::{OpenLoop, controller_response};
 use crate::identify::response::{FrequencyResponse, ResponsePoint};
 
 /// A measured response of which the trustworthy lines are kept, to be read at any frequency of its band.

@@ -1,6 +1,6 @@
 //! Controller design on the linear model of an axis: loop shape, margins, and gains chosen by a stated criterion.
 //!
-//! Everything here works on [`OpenLoop`], a frequency response with a band: the continuous textbook form, the exact
+//! Everything here works on [`OpenLoop`](quadrant_sim::loop_shape::OpenLoop), a frequency response with a band: the continuous textbook form, the exact
 //! sampled form with the controller's own difference equations, or anything else that answers with a complex number.
 //! The *nonlinear* gain that a design then allows is [`quadrant_settings::popov::sector_bound`]'s answer.
 
@@ -28,13 +28,10 @@ pub use form::Form;
 pub use integral_gain::{
     Printed, PrintedMargins, largest_integral_gain, largest_integral_gain_where,
 };
-pub use loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
-pub use margins::{MarginError, Margins, margins};
 pub use modal::{ModalDesign, modal_pid};
 pub use noise::noise_voltage_v;
 pub use pid::{DesignError, INTEGRAL_SHARE, PidDesign, PidRequest, Target, design_pid};
 pub use process::Process;
-pub use quadrant_sim::{held_plant, loop_shape, margins};
 pub use shaping::{ShapingError, shape_to_crossover, shape_to_margins};
 
 #[cfg(test)]

@@ -9,9 +9,9 @@ use quadrant_law::control::filter::FilterSettings;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::control::plant_model::PlantModel;
 use quadrant_settings::popov::filtered_sector_bound;
+use quadrant_sim::margins::Margins;
 
 use super::form::Form;
-use super::margins::Margins;
 use super::pid::{DesignError, PidDesign};
 use super::process::Process;
 use super::search::{BOUND_RESERVES, Search};

@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 use quadrant_law::control::pid::PidGains;
+use quadrant_sim::loop_shape::OpenLoop;
 
 use super::form::Form;
-use super::loop_shape::OpenLoop;
 use super::process::Process;
 
 /// Frequencies of the sum, even up to the highest.

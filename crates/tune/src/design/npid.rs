@@ -7,9 +7,9 @@ use quadrant_law::control::npid::NonlinearGain;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::control::plant_model::PlantModel;
 use quadrant_settings::popov::{SectorProof, filtered_sector_bound, sector_proof};
+use quadrant_sim::loop_shape::OpenLoop;
 
 use super::form::Form;
-use super::loop_shape::OpenLoop;
 use super::process::Process;
 
 /// Rule by which ko and emax are chosen.

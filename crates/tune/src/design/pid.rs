@@ -1,11 +1,11 @@
 //! A PID to order: margins, crossover, or the stiffest loop under bounds on sensitivity.
 
 use quadrant_law::control::pid::PidGains;
+use quadrant_sim::margins::{MarginError, Margins};
 
 use super::bandwidth::{NoLoop, PeakBounds, stiffest};
 use super::form::Form;
 use super::integral_gain::largest_integral_gain_where;
-use super::margins::{MarginError, Margins};
 use super::process::Process;
 use super::shaping::{ShapingError, shape_to_crossover, shape_to_margins};
 

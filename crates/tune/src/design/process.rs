@@ -4,10 +4,10 @@
 use num_complex::Complex64;
 use quadrant_law::control::{filter::FilterSettings, pid::PidGains, plant_model::PlantModel};
 use quadrant_settings::response::{LinearResponse, denominator, sampled_filter_response};
+use quadrant_sim::loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
+use quadrant_sim::margins::{LoopGains, MarginError, Margins, bisect, margins};
 
 use super::form::Form;
-use super::loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
-use super::margins::{LoopGains, MarginError, Margins, bisect, margins};
 use super::measured::{MeasuredLoop, MeasuredResponse};
 use crate::identify::mode::{self, Mode};
 

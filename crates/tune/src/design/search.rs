@@ -11,10 +11,10 @@ use argmin::core::{CostFunction, Executor};
 use argmin::solver::neldermead::NelderMead;
 use num_complex::Complex64;
 use quadrant_law::control::pid::PidGains;
+use quadrant_sim::loop_shape::OpenLoop;
 use rayon::prelude::*;
 
 use super::form::Form;
-use super::loop_shape::OpenLoop;
 use super::pid::PidDesign;
 use super::process::Process;
 

@@ -5,10 +5,10 @@ use std::fmt;
 
 use num_complex::Complex64;
 use quadrant_law::control::pid::PidGains;
+use quadrant_sim::loop_shape::OpenLoop;
+use quadrant_sim::margins::{LoopGains, MarginError, bisect};
 
 use super::form::Form;
-use super::loop_shape::OpenLoop;
-use super::margins::{LoopGains, MarginError, bisect};
 use super::process::Process;
 
 /// Reasons for which no gains have the margins asked for.

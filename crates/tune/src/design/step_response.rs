@@ -6,8 +6,7 @@ use quadrant_law::control::pid::Pid;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::control::plant_model::PlantModel;
 use quadrant_law::control::terms::FeedbackState;
-
-use super::held_plant::{HeldPlant, HeldPlantRun};
+use quadrant_sim::held_plant::{HeldPlant, HeldPlantRun};
 
 /// A step to answer.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,14 +4,13 @@ use proptest::prelude::*;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::control::plant_model::PlantModel;
 use quadrant_settings::popov::sector_bound;
+use quadrant_sim::loop_shape::{ContinuousLoop, SampledLoop};
+use quadrant_sim::margins::margins;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::fixtures::{FILTER_S, X_GAINS, X_PLANT, Y_PLANT, Z_PLANT};
-use super::{
-    ContinuousLoop, Form, Process, SampledLoop, ShapingError, margins, noise_voltage_v,
-    shape_to_margins,
-};
+use super::{Form, Process, ShapingError, noise_voltage_v, shape_to_margins};
 
 /// Control period of these tests, s.
 const PERIOD_S: f64 = 1e-4;

@@ -12,9 +12,8 @@ use quadrant_law::control::pid::Pid;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::control::plant_model::PlantModel;
 use quadrant_law::control::terms::FeedbackState;
+use quadrant_sim::held_plant::{HeldPlant, HeldPlantRun};
 use rayon::prelude::*;
-
-use super::held_plant::{HeldPlant, HeldPlantRun};
 
 /// A gain that switches between one and its largest value.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -10,9 +10,6 @@ pub enum MachineError {
     /// Settings that are refused.
     #[error(transparent)]
     Settings(#[from] SettingsError),
-    /// The control law alone has no flash.
-    #[error("the control law alone has no flash to store settings in: take another --machine")]
-    NoFlash,
     /// The connection failed, or the machine refused.
     #[error(transparent)]
     Connection(Box<dyn Error + Send + Sync>),

@@ -1,7 +1,7 @@
 //! An axis that is measured: what identification and commissioning ask of a machine.
 //!
 //! - [`TestAxis`]: an axis of any kind, on which an [`Experiment`] is performed; [`Travel`]: the room that it has;
-//! - [`approach`], [`approach_from`]: to a position between experiments;
+//! - [`approach()`], [`approach_from`]: to a position between experiments;
 //! - [`SimulatedTestAxis`]: an axis of the simulated stage under the control law alone.
 
 mod approach;
