@@ -2,7 +2,7 @@
 //!
 //! This crate is what the firmware does around the control law ([`quadrant_law`]) and its settings ([`quadrant_settings`])
 //! without a register: it knows no operating system, no heap and no chip. The firmware (the binary of this package) stands on
-//! it, and so does a machine that a host simulates whole (`quadrant_sim`).
+//! it, and so does a machine that a host simulates whole (`quadrant_host`).
 //!
 //! - [`app`]: the work of the firmware's tasks, and the queues between them;
 //! - [`store`]: settings in flash that no power cut loses;

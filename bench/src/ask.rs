@@ -6,7 +6,7 @@ use quadrant::link::message::{
     Value as LeafValue,
 };
 use quadrant_settings::tree::expand;
-use quadrant_simulation::setting_value;
+use quadrant_sim::setting_value;
 use serde::Deserialize;
 use serde_json::Value;
 

@@ -12,9 +12,9 @@ use quadrant_law::safety::SafetyState;
 use quadrant_law::stage::Outputs;
 use quadrant_settings::Job;
 use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
-use quadrant_simulation::law_machine::{LawMachine, Operator};
-use quadrant_simulation::plant::{AxisParameters, SimulatedStage, virgin_curve_elements};
-use quadrant_simulation::settings_file::SettingsFile;
+use quadrant_sim::law_machine::{LawMachine, Operator};
+use quadrant_sim::plant::{AxisParameters, SimulatedStage, virgin_curve_elements};
+use quadrant_sim::settings_file::SettingsFile;
 use serde::{Deserialize, Serialize};
 
 use crate::truth::{Ripple, Truth};

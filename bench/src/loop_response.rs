@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use quadrant_law::control::plant_model::PlantModel;
 use quadrant_settings::StageSettings;
-use quadrant_simulation::loop_shape::{OpenLoop, SampledLoop};
-use quadrant_simulation::margins::margins;
-use quadrant_simulation::plant::StageParameters;
+use quadrant_sim::loop_shape::{OpenLoop, SampledLoop};
+use quadrant_sim::margins::margins;
+use quadrant_sim::plant::StageParameters;
 use serde::Serialize;
 
 /// Band of the plot, Hz.

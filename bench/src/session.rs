@@ -10,7 +10,7 @@ use quadrant::link::message::{
     TelemetryRequest, Value as LeafValue,
 };
 use quadrant_settings::StageSettings;
-use quadrant_simulation::setting_value;
+use quadrant_sim::setting_value;
 use serde_json::{Value, json};
 
 use crate::ask::Ask;

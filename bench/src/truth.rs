@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use quadrant_simulation::plant::{AxisParameters, StageParameters};
+use quadrant_sim::plant::{AxisParameters, StageParameters};
 use serde::Serialize;
 
 /// A knob of the stage, which turns all axes alike.

@@ -1,8 +1,5 @@
 //! `quadrant circle`.
 
-use crate::numbers::{self, Numbers};
-use crate::own_stage::{self, OwnStage};
-use crate::plane::PlaneName;
 use anyhow::{Context, ensure};
 use clap::Args;
 use quadrant_cli::law_settings::LawSettings;
@@ -10,11 +7,15 @@ use quadrant_cli::output::{Output, command_line, progress};
 use quadrant_cli::say;
 use quadrant_law::axes::AxisName;
 use quadrant_law::reference::Plane;
-use quadrant_sim::circle::page::{circle_page, circle_tables};
-use quadrant_sim::circle::{CircleRequest, run_circle_tests};
-use quadrant_sim::experiment::run_configuration::RunConfiguration;
-use quadrant_sim::pages::provenance;
+use quadrant_pages::circle::page::{circle_page, circle_tables};
+use quadrant_pages::circle::{CircleRequest, run_circle_tests};
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
+use quadrant_pages::parts::provenance;
 use quadrant_sim::stage_file::StageFile;
+
+use crate::numbers::{self, Numbers};
+use crate::own_stage::{self, OwnStage};
+use crate::plane::PlaneName;
 
 /// Options of `quadrant circle`.
 #[derive(Clone, Debug, Args)]

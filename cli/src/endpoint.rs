@@ -6,13 +6,14 @@ use std::str::FromStr;
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 use quadrant_cli::{terminal, warn};
+use quadrant_host::client::{Client, Interrupt};
+use quadrant_host::machine::{
+    LawStage, Machine, SerialTransport, Shared, SimulatedLink, TcpTransport, Transport,
+};
 use quadrant_law::axes::AxisName;
 use quadrant_settings::StageSettings;
-use quadrant_sim::client::{Client, Interrupt};
-use quadrant_sim::machine::{
-    LawStage, Machine, SerialTransport, Shared, SimulatedLink, StageSetup, TcpTransport, Transport,
-};
 use quadrant_sim::stage_file::StageFile;
+use quadrant_sim::stage_setup::StageSetup;
 
 /// Image that `cargo xtask build --board mps2` leaves, from the workspace's folder.
 pub(super) const DEFAULT_IMAGE: &str = "target/images/mps2-f32.elf";
@@ -263,7 +264,7 @@ fn emulated(
     share: Option<&str>,
 ) -> anyhow::Result<Client> {
     let setup = simulation.setup(Preset::Fresh)?;
-    let link = quadrant_sim::machine::EmulatedLink::start(image, &setup, simulation.seed, flash)?;
+    let link = quadrant_host::machine::EmulatedLink::start(image, &setup, simulation.seed, flash)?;
     session(link, share)
 }
 

@@ -5,9 +5,9 @@ use std::path::Path;
 use anyhow::bail;
 use quadrant_law::axes::AxisName;
 use quadrant_settings::StageSettings;
-use quadrant_sim::report::whole;
 use quadrant_sim::setting_value::{Change, changes, lost};
 use quadrant_sim::settings_file::SettingsFile;
+use quadrant_written::whole;
 
 /// Settings to start from where there are none: those of the simulated stage, no axis of which anybody has commissioned.
 pub(super) fn built_in() -> SettingsFile {

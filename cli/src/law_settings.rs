@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use quadrant_law::axes::AxisName;
-use quadrant_sim::experiment::run_configuration::identified_settings;
+use quadrant_sim::identified_stage::identified_settings;
 use quadrant_sim::settings_file::{SettingsFile, SettingsFileError};
 
 use crate::warn;

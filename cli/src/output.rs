@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use quadrant_pages::parts::provenance;
+use quadrant_report::{Block, FIGURES, Format, Page, Section, Table};
 
 use crate::{say, terminal};
-use quadrant_sim::pages::provenance;
-use quadrant_sim::report::{Block, FIGURES, Format, Page, Section, Table};
 
 /// Options that every experiment has.
 #[derive(Clone, Debug, Args)]

@@ -9,15 +9,15 @@ use quadrant_cli::output::{Output, command_line, share};
 use quadrant_cli::say;
 use quadrant_law::axes::AxisName;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
 use quadrant_settings::StageSettings;
-use quadrant_sim::commission::commission_stage;
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::RunConfiguration;
-use quadrant_sim::machine::{BUILT_IN_STAGE, StageSetup};
-use quadrant_sim::record::AxisLimits;
-use quadrant_sim::report::whole;
 use quadrant_sim::settings_file::SettingsFile;
 use quadrant_sim::stage_file::StageFile;
+use quadrant_sim::stage_setup::{BUILT_IN_STAGE, StageSetup};
+use quadrant_tune::commission::commission_stage;
+use quadrant_tune::record::AxisLimits;
+use quadrant_written::whole;
 
 /// Option that names a simulated stage of one's own.
 #[derive(Clone, Debug, Default, Args)]

@@ -6,18 +6,17 @@ use anyhow::{bail, ensure};
 use clap::Args;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, progress};
+use quadrant_cli::warn;
 use quadrant_law::axes::AxisName;
-use quadrant_sim::experiment::run_configuration::{ModelKnowledge, RunConfiguration};
-use quadrant_sim::pages::provenance;
-use quadrant_sim::record::Record;
-use quadrant_sim::replay::recorded;
-use quadrant_sim::replay::recorded::RecordedAxis;
-use quadrant_sim::replay::recorded_page::{recorded_page, recorded_table};
+use quadrant_pages::experiment::run_configuration::{ModelKnowledge, RunConfiguration};
+use quadrant_pages::parts::provenance;
+use quadrant_pages::replay::recorded::{self, RecordedAxis};
+use quadrant_pages::replay::recorded_page::{recorded_page, recorded_table};
 use quadrant_sim::stage_file::StageFile;
+use quadrant_tune::record::Record;
 
 use super::own_stage::{self, OwnStage};
 use super::replay_program::{self, ProgramOptions};
-use quadrant_cli::warn;
 
 /// Options of `quadrant replay`.
 #[derive(Clone, Debug, Args)]

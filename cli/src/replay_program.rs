@@ -5,14 +5,16 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use quadrant_cli::output::{Output, command_line, progress};
 use quadrant_cli::{say, warn};
+use quadrant_gcode::{Limits, Program, Trajectory};
 use quadrant_law::axes::AxisName;
-use quadrant_sim::experiment::run_configuration::RunConfiguration;
-use quadrant_sim::gcode::{Limits, Program, Trajectory};
-use quadrant_sim::pages::provenance;
-use quadrant_sim::record::write_trace;
-use quadrant_sim::replay::part_program::{ProgramOutcome, ProgramTables, run_program};
-use quadrant_sim::replay::part_program_page::{motion_summary_table, program_page, program_table};
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
+use quadrant_pages::parts::provenance;
+use quadrant_pages::replay::part_program::{ProgramOutcome, ProgramTables, run_program};
+use quadrant_pages::replay::part_program_page::{
+    motion_summary_table, program_page, program_table,
+};
 use quadrant_sim::stage_file::StageFile;
+use quadrant_tune::record::write_trace;
 
 use crate::own_stage;
 

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use quadrant_cli::{say, terminal};
-use quadrant_sim::settings_reference::{markdown, rows};
+use quadrant_pages::settings_reference::{markdown, rows};
 
 /// Options of `quadrant settings`.
 #[derive(Clone, Debug, Args)]

@@ -4,17 +4,18 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
+use quadrant_cli::axis::Axis;
+use quadrant_cli::output::command_line;
+use quadrant_cli::{explained, say};
+use quadrant_host::machine::Machine;
 use quadrant_law::axes::AxisName;
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::machine::{Machine, MachineError, TestAxis, Travel};
 use quadrant_sim::settings_file::SettingsFile;
+use quadrant_tune::test_axis::{MachineError, TestAxis, Travel};
 
 use super::endpoint::{Endpoint, Simulation};
 use super::kept;
 use super::own_stage::OwnStage;
-use quadrant_cli::axis::Axis;
-use quadrant_cli::output::command_line;
-use quadrant_cli::{explained, say};
 
 /// Options that name the axis, the machine and the settings to start from.
 #[derive(Clone, Debug, Args)]
@@ -274,8 +275,9 @@ impl Destination {
 
 #[cfg(test)]
 mod tests {
-    use quadrant_sim::machine::{AxisInfo, Experiment, ExperimentError, LawStage};
-    use quadrant_sim::record::Recording;
+    use quadrant_host::machine::LawStage;
+    use quadrant_tune::record::Recording;
+    use quadrant_tune::test_axis::{AxisInfo, Experiment, ExperimentError};
 
     use super::*;
 

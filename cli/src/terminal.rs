@@ -8,7 +8,7 @@ use std::fmt::{self, Arguments, Write as _};
 use std::io::{self, IsTerminal, StdoutLock, Write};
 use std::sync::Mutex;
 
-use quadrant_sim::report::wrapped;
+use quadrant_report::wrapped;
 
 /// The first error of standard output.
 static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);

@@ -9,9 +9,8 @@ use quadrant_law::command::Command;
 use quadrant_law::friction::gms::{FIRMWARE_ELEMENTS, MAX_ELEMENTS};
 use quadrant_law::safety::SafetyState;
 use quadrant_law::scalar::{Fixed, Scalar};
-use quadrant_sim::machine::benchmark_job::circle_and_sine;
-use quadrant_sim::machine::law::TickInput;
-use quadrant_sim::machine::{LawMachine, Operator};
+use quadrant_sim::benchmark_job::circle_and_sine;
+use quadrant_sim::law_machine::{LawMachine, Operator, TickInput};
 use quadrant_sim::plant::{SimulatedAxis, SimulatedStage, StageParameters};
 
 /// A machine on its stage, moving.

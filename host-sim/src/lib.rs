@@ -1,37 +1,45 @@
-//! The host's tools: the simulated XYZ stage, machines that the control law runs on, and what is done around a controller.
+//! The simulated stage under the control law, wherever Rust runs: on a host, and in a browser.
 //!
 //! - [`plant`]: the stage, simulated, with friction that the control law does not know exactly;
-//! - [`machine`]: the control law alone, the firmware's application in this process, its image in QEMU, a board: one
-//!   interface to measure them all;
-//! - [`client`]: a session with a machine over the link;
-//! - [`experiment`]: runs of a machine on a stage, and their scores;
-//! - [`compare`], [`circle`], [`replay`]: the comparison, the circle test, recorded references and part programs, each with
-//!   its tables and figures;
-//! - [`commission`]: from an unknown axis to settings that the firmware runs;
-//! - [`identify`]: from recordings to the parameters of an axis;
-//! - [`design`]: margins, loop shaping, the choice of gains;
-//! - [`record`]: recorded motions from CSV files, checked;
-//! - [`gcode`]: part programs, and their motion;
-//! - [`stage_file`]: a simulated stage of one's own, as TOML;
-//! - [`settings_file`]: a stage's settings with their origin, as TOML; [`setting_value`]: their values, and what differs;
-//! - [`settings_reference`]: the meaning of every setting, as a page;
-//! - [`report`], [`pages`]: pages, tables and figures, and parts that several pages have.
+//! - [`law_machine`]: the control law and its supervisor, tick by tick; [`run`]: one run of it on the stage, and its traces;
+//! - [`metrics`]: tracking error and quadrant glitch; [`sine_test`]: an axis on a sine, scored; [`benchmark_job`]: the motion
+//!   that ticks are counted and timed with;
+//! - [`stage_setup`]: the stage of a simulated machine, and its settings; [`identified_stage`]: those that commissioning gave;
+//! - [`settings_file`]: a stage's settings with their origin, as TOML; [`toml_file`]: what such files have in common;
+//! - [`stage_file`]: a stage of one's own, as TOML;
+//! - [`setting_value`]: a setting's value as it crosses the link, and as JSON;
+//! - [`held_plant`], [`loop_shape`], [`margins`]: the linear axis behind its converter, the open loop, its margins.
+//!
+//! It knows no threads, ports and clock, no link, no application of the firmware, and no channel to an emulator.
 #![forbid(unsafe_code)]
 // A tool, not a library for others: a comment that only repeats a name is left out.
 #![allow(missing_docs)]
 
-pub mod circle;
-pub mod client;
-pub mod commission;
-pub mod compare;
-pub mod design;
-pub mod experiment;
-pub mod gcode;
-pub mod identify;
-pub mod machine;
-pub mod pages;
-pub mod record;
-pub mod replay;
-pub use quadrant_report as report;
-pub use quadrant_simulation::{plant, setting_value, settings_file, stage_file};
-pub mod settings_reference;
+pub mod benchmark_job;
+pub mod held_plant;
+pub mod identified_stage;
+pub mod law_machine;
+pub mod loop_shape;
+pub mod margins;
+pub mod metrics;
+pub mod plant;
+pub mod run;
+pub mod setting_value;
+pub mod settings_file;
+pub mod sine_test;
+pub mod stage_file;
+pub mod stage_setup;
+pub mod toml_file;
+
+#[cfg(test)]
+mod fixtures {
+    use quadrant_law::control::pid::PidGains;
+    use quadrant_settings::presets;
+    pub(crate) use quadrant_settings::presets::X_PLANT;
+
+    /// The proportional and derivative gains of the x axis, chosen with its plant.
+    pub(crate) const X_GAINS: PidGains = PidGains {
+        ki_v_per_mm_s: 0.0,
+        ..presets::X_GAINS
+    };
+}

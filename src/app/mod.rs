@@ -17,7 +17,7 @@
 //! [`Axis`](quadrant_law::axis::Axis) that the law does not use, the back buffer, and swapped whole, by reference.
 //!
 //! The firmware puts each piece into an RTIC task; a host runs them one after the other in one thread
-//! (`quadrant_sim::machine`), in the order in which the target would.
+//! (`quadrant_host::machine`), in the order in which the target would.
 
 pub mod capture;
 mod change_detector;

@@ -4,12 +4,12 @@
 //! the linear damping as the total damping `B + A sigma`, and a direction's friction levels with the amplifier's offset.
 
 use clap::Args;
+use quadrant_pages::parts::columns;
+use quadrant_report::{Block, Cell, Section, Table};
 use quadrant_settings::StageSettings;
-use quadrant_sim::commission::{CommissionError, CommissionSettings, Commissioned, commission};
-use quadrant_sim::machine::SimulatedTestAxis;
-use quadrant_sim::pages::columns;
 use quadrant_sim::plant::{AxisParameters, StageParameters};
-use quadrant_sim::report::{Block, Cell, Section, Table};
+use quadrant_tune::commission::{CommissionError, CommissionSettings, Commissioned, commission};
+use quadrant_tune::test_axis::SimulatedTestAxis;
 use rayon::prelude::*;
 
 use crate::study::{Advance, Study, results};

@@ -6,14 +6,16 @@
 
 use clap::Args;
 use quadrant_law::scalar::{Fixed, Scalar};
-use quadrant_sim::compare::sine::{Bench, Outcome, Sines, run_configuration};
-use quadrant_sim::experiment::configuration::{Configuration, ELEMENTS};
-use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
-use quadrant_sim::machine::LawMachine;
-use quadrant_sim::machine::law::TickInput;
-use quadrant_sim::pages::UM_PER_MM;
-use quadrant_sim::report::{Block, Cell, Column, Section, Table};
+use quadrant_pages::compare::sine::{Bench, Outcome, Sines, run_configuration};
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
+use quadrant_pages::parts::UM_PER_MM;
+use quadrant_report::{Block, Cell, Column, Section, Table};
+use quadrant_sim::identified_stage::identified_settings;
+use quadrant_sim::law_machine::LawMachine;
+use quadrant_sim::law_machine::TickInput;
+use quadrant_sim::run::ELEMENTS;
+use quadrant_sim::run::RunError;
 use rayon::prelude::*;
 
 use crate::study::{Advance, Study, results};

@@ -3,11 +3,12 @@
 
 use clap::Args;
 use quadrant_law::noise_shaper::NoiseShaper;
-use quadrant_sim::compare::sine::{Bench, Outcome, Sines, VELOCITIES_MM_S, run_bench};
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
-use quadrant_sim::pages::UM_PER_MM;
-use quadrant_sim::report::{Block, Cell, Column, Section, Table};
+use quadrant_pages::compare::sine::{Bench, Outcome, Sines, VELOCITIES_MM_S, run_bench};
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
+use quadrant_pages::parts::UM_PER_MM;
+use quadrant_report::{Block, Cell, Column, Section, Table};
+use quadrant_sim::identified_stage::identified_settings;
 use rayon::prelude::*;
 
 use crate::study::{Advance, Study, results};

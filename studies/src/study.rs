@@ -3,8 +3,8 @@
 use clap::Args;
 use quadrant_cli::output::{Output, command_line, share};
 use quadrant_cli::say;
-use quadrant_sim::pages::provenance;
-use quadrant_sim::report::{Block, Page, Section, Table};
+use quadrant_pages::parts::provenance;
+use quadrant_report::{Block, Page, Section, Table};
 
 /// Receives the share of a whole that was done since its last call, from any thread.
 pub type Advance<'a> = &'a (dyn Fn(f64) + Sync);

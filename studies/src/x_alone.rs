@@ -2,8 +2,8 @@
 
 use quadrant_law::reference::MotionSettings;
 use quadrant_settings::{AxisSettings, Job, PlanSettings, SettingsError, StageSettings};
-use quadrant_sim::experiment::configuration::ELEMENTS;
-use quadrant_sim::machine::LawMachine;
+use quadrant_sim::law_machine::LawMachine;
+use quadrant_sim::run::ELEMENTS;
 
 /// The law of an axis, as the x axis of a stage, with a motion to run.
 ///

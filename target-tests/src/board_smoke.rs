@@ -9,12 +9,12 @@ use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
-use quadrant_sim::machine::emulator::Program;
-
-use crate::gdb::{Debugger, PROGRAM_COUNTER, Port, STACK_POINTER};
+use quadrant_host::machine::emulator::Program;
 use xtask::command;
 use xtask::image::{self, Board, Image, Scalar, Target};
 use xtask::toolchain::Toolchain;
+
+use crate::gdb::{Debugger, PROGRAM_COUNTER, Port, STACK_POINTER};
 
 /// QEMU's machine with an STM32F405.
 const MACHINE: &str = "netduinoplus2";

@@ -3,12 +3,13 @@
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
+use quadrant_host::client::Client;
+use quadrant_host::machine::{EmulatedLink, Machine};
 use quadrant_law::axes::AxisName;
-use quadrant_sim::client::Client;
-use quadrant_sim::commission::{CommissionSettings, commission};
-use quadrant_sim::identify::static_friction::StaticFrictionSettings;
-use quadrant_sim::machine::{EmulatedLink, Machine, StageSetup, Travel};
-
+use quadrant_sim::stage_setup::StageSetup;
+use quadrant_tune::commission::{CommissionSettings, commission};
+use quadrant_tune::identify::static_friction::StaticFrictionSettings;
+use quadrant_tune::test_axis::Travel;
 use xtask::image::{self, Board, Scalar, Target};
 use xtask::toolchain::Toolchain;
 

@@ -5,17 +5,16 @@ use std::ops::Range;
 
 use anyhow::{Context, Result, ensure};
 use quadrant::lockstep::{BASE, InputRecord, Mode, OutputRecord, RECORDED_OUTPUTS};
+use quadrant_host::machine::emulator::Memory;
 use quadrant_law::safety::Switches;
 use quadrant_settings::Job;
-use quadrant_sim::machine::emulator::Memory;
+use xtask::image::{self, Board, Image, Scalar, Target};
+use xtask::toolchain::Toolchain;
 
-use crate::hosted;
-use crate::lockstep;
 use crate::near_home::{ENABLE_TICK, HOME_TICK, RUN_TICK};
 use crate::reference_model::{self, ReferenceModel, SETTLING_TICKS};
 use crate::trace::{Tick, Trace};
-use xtask::image::{self, Board, Image, Scalar, Target};
-use xtask::toolchain::Toolchain;
+use crate::{hosted, lockstep};
 
 /// The image that is emulated.
 pub(crate) fn emulated(toolchain: Toolchain, scalar: Scalar) -> Result<Image> {

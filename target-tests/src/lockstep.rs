@@ -7,14 +7,14 @@ use indicatif::{ProgressBar, ProgressStyle};
 use quadrant::lockstep::{
     InputRecord, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
 };
+use quadrant_host::machine::emulator::{Clock, Emulator, Lockstep, Memory};
 use quadrant_law::stage::Outputs;
 use quadrant_settings::Job;
-use quadrant_sim::machine::emulator::{Clock, Emulator, Lockstep, Memory};
+use xtask::image::{self, Board, Image, Scalar, Target};
+use xtask::toolchain::Toolchain;
 
 use crate::ahead;
 use crate::reference_model::{self, ReferenceModel, Tally};
-use xtask::image::{self, Board, Image, Scalar, Target};
-use xtask::toolchain::Toolchain;
 
 /// Control ticks per second of the firmware's time.
 const RATE_HZ: f64 = 10_000.0;

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::io::Read;
 
 use anyhow::{Context, Result, ensure};
-use quadrant_sim::machine::emulator::Memory;
-
-use crate::trace::{self, for_each_instruction};
+use quadrant_host::machine::emulator::Memory;
 use xtask::command;
 use xtask::image::{Board, Image, Scalar, Target};
 use xtask::listing::Listing;
 use xtask::toolchain::Toolchain;
+
+use crate::trace::{self, for_each_instruction};
 
 /// Package and program.
 const PEER: &str = "quadrant-peer";

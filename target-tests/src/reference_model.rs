@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use quadrant::lockstep::InputRecord;
+use quadrant_host::machine::emulator::{Program, input_of, record_of};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
@@ -12,15 +13,13 @@ use quadrant_law::motion::MotionMode;
 use quadrant_law::scalar::{Fixed, Scalar};
 use quadrant_law::stage::Outputs;
 use quadrant_settings::Job;
-use quadrant_sim::machine::benchmark_job::circle_and_sine;
-use quadrant_sim::machine::emulator::Program;
-use quadrant_sim::machine::emulator::{input_of, record_of};
-use quadrant_sim::machine::{LawMachine, Operator};
+use quadrant_sim::benchmark_job::circle_and_sine;
+use quadrant_sim::law_machine::{LawMachine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageParameters};
 use quadrant_sim::settings_file::SettingsFile;
+use xtask::image::{self, Image};
 
 use crate::near_home;
-use xtask::image::{self, Image};
 
 /// Seed of the simulated stage's noise.
 const SEED: u64 = 1;

@@ -8,16 +8,15 @@ use std::io::{BufRead, BufReader, Read};
 use std::process::Stdio;
 
 use anyhow::{Context, Result, anyhow, bail};
-use quadrant_sim::machine::emulator::{self, Clock, Emulator, Memory};
-
-use crate::attribution::Attribution;
-use crate::gdb::{Debugger, Port};
-use crate::reference_model;
-use crate::stages;
+use quadrant_host::machine::emulator::{self, Clock, Emulator, Memory};
 use xtask::call_graph::{CallGraph, Flow, flow};
 use xtask::image::Image;
 use xtask::listing::{Function, Listing};
 use xtask::prove::ROOT;
+
+use crate::attribution::Attribution;
+use crate::gdb::{Debugger, Port};
+use crate::{reference_model, stages};
 
 /// Trace of an image.
 pub(crate) struct Trace {

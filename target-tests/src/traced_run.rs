@@ -3,11 +3,11 @@
 use std::process::ChildStderr;
 
 use anyhow::{Context, Result, anyhow};
-use quadrant_sim::machine::emulator::{Emulator, Memory};
+use quadrant_host::machine::emulator::{Emulator, Memory};
+use xtask::image::Image;
 
 use crate::faults::fixture::{Configuration, Fixture};
 use crate::trace::Tracer;
-use xtask::image::Image;
 
 /// Runs a fixture while its trace is read.
 pub(crate) fn run<T: Send>(

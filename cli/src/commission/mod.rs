@@ -9,31 +9,32 @@ use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
+use quadrant_cli::axis::Axis;
+use quadrant_cli::output::{Output, command_line, share};
+use quadrant_cli::{say, terminal, warn};
+use quadrant_host::machine::{Begun, Journal, Machine};
 use quadrant_law::axes::AxisName;
+use quadrant_pages::commission::{commission_page, gains_table, plan_table, results_table};
+use quadrant_pages::identify::friction::{friction_table, gms_table};
+use quadrant_pages::identify::linear::{motor_constant_table, plant_tables};
+use quadrant_pages::identify::revise::revise_table;
+use quadrant_pages::parts::provenance;
+use quadrant_report::{Table, wrapped};
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::commission::page::{commission_page, gains_table, results_table};
-use quadrant_sim::commission::{
-    CommissionError, CommissionSettings, Commissioned, CrossCheck, commission, plan, plan_table,
-};
-use quadrant_sim::design::Target;
-use quadrant_sim::identify::pages::friction::{friction_table, gms_table};
-use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
-use quadrant_sim::identify::pages::revise::revise_table;
-use quadrant_sim::machine::{Begun, Journal, Machine, TestAxis, Travel};
-use quadrant_sim::pages::provenance;
-use quadrant_sim::report::{Table, wrapped};
 use quadrant_sim::setting_value::{Change, changes};
 use quadrant_sim::settings_file::SettingsFile;
 use quadrant_sim::stage_file::StageFile;
+use quadrant_tune::commission::{
+    CommissionError, CommissionSettings, Commissioned, CrossCheck, commission, plan,
+};
+use quadrant_tune::design::Target;
+use quadrant_tune::test_axis::{TestAxis, Travel};
 use serde_json::{Value, json};
 
 use super::endpoint::{Endpoint, Simulation};
 use super::kept;
 use super::own_stage::{OwnStage, axes, refuse_other_hardware};
 use super::subject::{and_restored, known_travel, travel_both_ways};
-use quadrant_cli::axis::Axis;
-use quadrant_cli::output::{Output, command_line, share};
-use quadrant_cli::{say, terminal, warn};
 
 /// Options of `quadrant commission`.
 #[derive(Clone, Debug, Args)]
@@ -660,8 +661,9 @@ impl Found {
 
 #[cfg(test)]
 mod tests {
-    use quadrant_sim::machine::{AxisInfo, Experiment, ExperimentError, LawStage, MachineError};
-    use quadrant_sim::record::Recording;
+    use quadrant_host::machine::LawStage;
+    use quadrant_tune::record::Recording;
+    use quadrant_tune::test_axis::{AxisInfo, Experiment, ExperimentError, MachineError};
 
     use super::*;
 

@@ -3,13 +3,12 @@
 use std::path::Path;
 
 use anyhow::bail;
-use quadrant_sim::commission::{Commissioned, CrossCheck, Measurements};
-use quadrant_sim::identify::frf::{FrfSettings, SavedSettings, response_of};
-use quadrant_sim::identify::motor_constant::{MotorConstantSettings, evaluate};
-use quadrant_sim::identify::static_friction::FrictionMap;
-use quadrant_sim::record::Recording;
-
 use quadrant_cli::output::Output;
+use quadrant_tune::commission::{Commissioned, CrossCheck, Measurements};
+use quadrant_tune::identify::frf::{FrfSettings, SavedSettings, response_of};
+use quadrant_tune::identify::motor_constant::{MotorConstantSettings, evaluate};
+use quadrant_tune::identify::static_friction::FrictionMap;
+use quadrant_tune::record::Recording;
 
 /// Settling time of a saved response, s.
 const SETTLING_S: f64 = 0.7;

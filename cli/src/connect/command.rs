@@ -5,14 +5,15 @@ use std::path::PathBuf;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand, ValueEnum};
 use quadrant::link::message::Channel;
-use quadrant_sim::machine::{Travel, simulated_io};
+use quadrant_cli::axis::Axis;
+use quadrant_cli::output::Output;
+use quadrant_host::machine::simulated_io;
+use quadrant_tune::test_axis::Travel;
 use strum::IntoStaticStr;
 
 use crate::commission::Request;
 use crate::plane::PlaneName;
 use crate::subject::{travel, travel_both_ways};
-use quadrant_cli::axis::Axis;
-use quadrant_cli::output::Output;
 
 /// One thing to ask of the machine.
 #[derive(Clone, Debug, Subcommand, IntoStaticStr)]

@@ -1,6 +1,6 @@
 //! `commission`: the connected axis from unknown to settings that it runs on, by the code of `quadrant commission`.
 
-use quadrant_sim::client::Client;
+use quadrant_host::client::Client;
 
 use super::answer::Answer;
 use super::command::CommissionOptions;

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use clap::{Arg, ArgAction, Command as Grammar, Subcommand};
 use quadrant::link::message::{AxisName, Channel};
+use quadrant_host::client::settings::whole_path;
 use quadrant_settings::leaves::{self, Range};
 use quadrant_settings::tree::is_part;
-use quadrant_sim::client::settings::whole_path;
 use rustyline::completion::{Completer, FilenameCompleter, Pair};
 use rustyline::highlight::Highlighter;
 use rustyline::hint::Hinter;

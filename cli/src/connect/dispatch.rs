@@ -1,7 +1,7 @@
 //! Each command, given to its part of the console.
 
 use anyhow::bail;
-use quadrant_sim::client::ClientError;
+use quadrant_host::client::ClientError;
 
 use super::answer::Answer;
 use super::command::{Command, RecordOptions};

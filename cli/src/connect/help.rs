@@ -1,7 +1,7 @@
 //! The list of the console's commands, by what they are for.
 
 use clap::Command;
-use quadrant_sim::report::wrapped;
+use quadrant_report::wrapped;
 
 /// The groups, and the names of their commands.
 pub(super) const GROUPS: [(&str, &[&str]); 6] = [

@@ -2,20 +2,20 @@
 
 use anyhow::Context;
 use quadrant_cli::terminal;
+use quadrant_host::client::Client;
 use quadrant_law::axes::AxisName;
+use quadrant_pages::identify::friction::{friction_table, gms_table};
+use quadrant_pages::identify::linear::{motor_constant_table, plant_tables};
+use quadrant_pages::identify::motion::motion_table;
+use quadrant_report::Table;
 use quadrant_settings::AxisSettings;
-use quadrant_sim::client::Client;
-use quadrant_sim::identify::frf::FrfSettings;
-use quadrant_sim::identify::motion::{MotionFitSettings, fit_motion, recommended};
-use quadrant_sim::identify::motor_constant::MotorConstantSettings;
-use quadrant_sim::identify::pages::friction::{friction_table, gms_table};
-use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
-use quadrant_sim::identify::pages::motion::motion_table;
-use quadrant_sim::identify::plant::{PlantFitSettings, Stiffness, fit_plant};
-use quadrant_sim::identify::static_friction::{Exponent, StaticFrictionSettings, fit_map};
-use quadrant_sim::identify::virgin_curve::{self, Knots};
-use quadrant_sim::machine::TestAxis;
-use quadrant_sim::report::Table;
+use quadrant_tune::identify::frf::FrfSettings;
+use quadrant_tune::identify::motion::{MotionFitSettings, fit_motion, recommended};
+use quadrant_tune::identify::motor_constant::MotorConstantSettings;
+use quadrant_tune::identify::plant::{PlantFitSettings, Stiffness, fit_plant};
+use quadrant_tune::identify::static_friction::{Exponent, StaticFrictionSettings, fit_map};
+use quadrant_tune::identify::virgin_curve::{self, Knots};
+use quadrant_tune::test_axis::TestAxis;
 use serde_json::json;
 
 use super::answer::Answer;

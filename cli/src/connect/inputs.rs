@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use quadrant::link::message::{AxisName, Inputs};
+use quadrant_host::machine::simulated_io::INPUTS;
 use quadrant_law::safety::Switches;
-use quadrant_sim::machine::simulated_io::INPUTS;
 use serde_json::{Value, json};
 
 use super::answer::{Answer, seconds};

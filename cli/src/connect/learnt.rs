@@ -2,9 +2,8 @@
 
 use quadrant::link::message::{AxisLearning, Learning};
 use quadrant_cli::axis::Axis;
+use quadrant_host::client::{Client, adopt};
 use quadrant_law::axes::AxisName;
-use quadrant_sim::client::Client;
-use quadrant_sim::client::adopt;
 use serde_json::{Value, json};
 
 use super::answer::Answer;

@@ -1,22 +1,22 @@
 //! Identity and status of the machine, and orders to it.
 
-use quadrant::app::Translated;
 use std::fmt::Write as _;
 
 use anyhow::{Context, bail};
+use quadrant::app::Translated;
 use quadrant::link::message::{self, AxisSet, Body, Status};
+use quadrant_cli::axis::Axis;
+use quadrant_host::client::settings::{self, whole_path};
+use quadrant_host::client::{Client, settle, with_reset};
+use quadrant_host::machine::serial_ports;
 use quadrant_law::axes::AxisName;
 use quadrant_law::safety::FaultCode;
-use quadrant_sim::client::settings::{self, whole_path};
-use quadrant_sim::client::{Client, settle, with_reset};
-use quadrant_sim::machine::serial_ports;
-use quadrant_sim::report::fixed;
+use quadrant_written::fixed;
 use serde_json::json;
 
 use super::answer::{Answer, RESTARTED, name, seconds};
 use super::command::Command;
 use super::{inputs, learnt};
-use quadrant_cli::axis::Axis;
 
 /// Lists the serial ports of this computer.
 pub(super) fn ports() -> anyhow::Result<Answer> {

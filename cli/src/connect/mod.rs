@@ -28,7 +28,7 @@ use std::time::Duration;
 use clap::Args;
 use quadrant::link::message::{AxisMode, MachineState};
 use quadrant_cli::warn;
-use quadrant_sim::client::Client;
+use quadrant_host::client::Client;
 
 use self::answer::Answer;
 use self::command::Command;

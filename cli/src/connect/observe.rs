@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use quadrant::link::message::{CaptureStatus, Channel, Edge, Event, Level, Notice, Trigger};
-use quadrant_sim::client::samples::{
+use quadrant_host::client::samples::{
     Samples, TelemetryRecorder, arm, capture_state, disarm, least_decimation, read_capture,
 };
-use quadrant_sim::client::{Client, columns, settings};
+use quadrant_host::client::{Client, columns, settings};
 use serde_json::{Value, json};
 
 use super::answer::{Answer, name, seconds};

@@ -1,23 +1,23 @@
 //! Plans and part programs.
 
-use quadrant::app::Translated;
 use std::f64::consts::TAU;
 use std::path::Path;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
+use quadrant::app::Translated;
 use quadrant::link::message::Body;
+use quadrant_cli::warn;
+use quadrant_gcode::{Limits, Program, Trajectory};
+use quadrant_host::client::set_points::{references_mm, set_points, stream};
+use quadrant_host::client::{Client, settings, settle};
 use quadrant_law::reference::{Sense, circle};
 use quadrant_settings::PlanSettings;
-use quadrant_sim::client::set_points::{references_mm, set_points, stream};
-use quadrant_sim::client::{Client, settings, settle};
-use quadrant_sim::gcode::{Limits, Program, Trajectory};
 use serde_json::json;
 
 use super::answer::Answer;
 use super::command::{CircleOptions, StreamOptions};
-use quadrant_cli::warn;
 
 pub(super) fn plan(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
     let text =

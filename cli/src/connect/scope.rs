@@ -6,15 +6,16 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use quadrant::link::message::Channel;
-use quadrant_sim::client::samples::{Samples, TelemetryRecorder, least_decimation};
-use quadrant_sim::client::{columns, plot, settings};
-use quadrant_sim::report::{Figure, Lines, Plot, Series, Style, fixed, stacked_svg, whole};
+use quadrant_cli::terminal;
+use quadrant_host::client::samples::{Samples, TelemetryRecorder, least_decimation};
+use quadrant_host::client::{columns, plot, settings};
+use quadrant_report::{Figure, Lines, Plot, Series, Style, stacked_svg};
+use quadrant_written::{fixed, whole};
 use serde_json::json;
 
 use super::answer::{Answer, seconds};
 use super::command::ScopeOptions;
 use super::session::Session;
-use quadrant_cli::terminal;
 
 /// Time from one picture to the next.
 const PICTURE: Duration = Duration::from_millis(100);

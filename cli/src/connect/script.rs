@@ -8,7 +8,8 @@ use std::time::Duration;
 
 use anyhow::Context;
 use quadrant::link::message::Body;
-use quadrant_sim::client::{Client, ClientError, settle};
+use quadrant_cli::{say, terminal};
+use quadrant_host::client::{Client, ClientError, settle};
 use rustyline::config::Configurer;
 use rustyline::error::ReadlineError;
 use rustyline::history::DefaultHistory;
@@ -19,7 +20,6 @@ use super::completion::Completion;
 use super::dispatch;
 use super::line::{Said, parse};
 use super::session::Session;
-use quadrant_cli::{say, terminal};
 
 /// Time of waiting for input after which a request reports to the machine that its host is there.
 const ATTENTION: Duration = Duration::from_millis(100);

@@ -1,8 +1,8 @@
 //! A session with a machine.
 
+use quadrant_host::client::Client;
+use quadrant_host::client::settings::Before;
 use quadrant_law::safety::Switches;
-use quadrant_sim::client::Client;
-use quadrant_sim::client::settings::Before;
 
 use super::printer::Printer;
 

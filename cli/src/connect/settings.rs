@@ -5,11 +5,11 @@ use std::path::Path;
 use anyhow::{Context, anyhow, bail};
 use quadrant::link::message::{Applied, Body, SettingsRequest};
 use quadrant::store::PROVENANCE_BYTES;
-use quadrant_sim::client::settings::{self, Before, Difference, whole_path};
-use quadrant_sim::client::{Client, ClientError};
-use quadrant_sim::report::whole;
+use quadrant_host::client::settings::{self, Before, Difference, whole_path};
+use quadrant_host::client::{Client, ClientError};
 use quadrant_sim::setting_value::{meant, short, shown};
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
+use quadrant_written::whole;
 use serde_json::{Map, Value, json};
 
 use super::answer::Answer;
@@ -290,7 +290,8 @@ pub(super) fn provenance(client: &mut Client) -> anyhow::Result<Answer> {
 
 #[cfg(test)]
 mod tests {
-    use quadrant_sim::machine::{Machine, SimulatedLink, StageSetup};
+    use quadrant_host::machine::{Machine, SimulatedLink};
+    use quadrant_sim::stage_setup::StageSetup;
 
     use super::*;
     use crate::connect::printer::Printer;

@@ -1,9 +1,9 @@
 //! Inputs, supply and log of a machine that is not real.
 
 use anyhow::{Context, bail};
+use quadrant_host::client::Client;
+use quadrant_host::machine::simulated_io::{INPUTS, SimulatedIo, without};
 use quadrant_law::safety::Switches;
-use quadrant_sim::client::Client;
-use quadrant_sim::machine::simulated_io::{INPUTS, SimulatedIo, without};
 use serde_json::json;
 
 use super::answer::{Answer, RESTARTED};

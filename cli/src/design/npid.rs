@@ -3,17 +3,17 @@
 use anyhow::bail;
 use clap::Args;
 use quadrant_cli::output::{Output, command_line, share};
+use quadrant_cli::say;
 use quadrant_law::control::plant_model::PlantModel;
-use quadrant_sim::design::npid::{NonlinearRule, Range, choose_nonlinear, filtered_proof};
-use quadrant_sim::design::pages::npid::NonlinearPage;
-use quadrant_sim::design::robustness::{Uncertainty, robustness};
-use quadrant_sim::design::step_response::{StepRequest, step_response};
-use quadrant_sim::design::time_varying::VaryingLoop;
-use quadrant_sim::design::{Form, Process};
-use quadrant_sim::pages::provenance;
+use quadrant_pages::design::npid::NonlinearPage;
+use quadrant_pages::parts::provenance;
+use quadrant_tune::design::npid::{NonlinearRule, Range, choose_nonlinear, filtered_proof};
+use quadrant_tune::design::robustness::{Uncertainty, robustness};
+use quadrant_tune::design::step_response::{StepRequest, step_response};
+use quadrant_tune::design::time_varying::VaryingLoop;
+use quadrant_tune::design::{Form, Process};
 
 use super::process::Model;
-use quadrant_cli::say;
 
 /// Options of `quadrant design npid`.
 #[derive(Clone, Debug, Args)]

@@ -5,15 +5,15 @@ use std::path::PathBuf;
 use anyhow::bail;
 use clap::{Args, ValueEnum};
 use quadrant_cli::output::{Output, command_line};
-use quadrant_sim::design::measured::MeasuredResponse;
-use quadrant_sim::design::pages::pid::PidPage;
-use quadrant_sim::design::step_response::{StepRequest, step_response};
-use quadrant_sim::design::{Form, INTEGRAL_SHARE, PidRequest, Process, Target, design_pid};
-use quadrant_sim::identify::response::FrequencyResponse;
-use quadrant_sim::pages::provenance;
+use quadrant_cli::say;
+use quadrant_pages::design::pid::PidPage;
+use quadrant_pages::parts::provenance;
+use quadrant_tune::design::measured::MeasuredResponse;
+use quadrant_tune::design::step_response::{StepRequest, step_response};
+use quadrant_tune::design::{Form, INTEGRAL_SHARE, PidRequest, Process, Target, design_pid};
+use quadrant_tune::identify::response::FrequencyResponse;
 
 use super::process::Model;
-use quadrant_cli::say;
 
 /// Options of `quadrant design pid`.
 #[derive(Clone, Debug, Args)]

@@ -4,16 +4,16 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
+use quadrant_cli::axis::Axis;
 use quadrant_cli::output::Output;
+use quadrant_cli::{say, warn};
 use quadrant_law::control::filter::FilterSettings;
 use quadrant_law::control::plant_model::PlantModel;
 use quadrant_settings::AxisSettings;
-use quadrant_sim::design::Form;
 use quadrant_sim::settings_file::SettingsFile;
+use quadrant_tune::design::Form;
 
 use crate::kept;
-use quadrant_cli::axis::Axis;
-use quadrant_cli::{say, warn};
 
 /// File of the settings in the folder for results.
 const SETTINGS: &str = "settings.toml";

@@ -3,20 +3,20 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use quadrant_cli::output::{Output, with_bar};
+use quadrant_cli::{say, warn};
+use quadrant_pages::identify::linear::response_section;
 use quadrant_settings::AxisSettings;
-use quadrant_sim::commission::bootstrap::measuring_settings;
-use quadrant_sim::identify::excitation::{Excitation, Waveform};
-use quadrant_sim::identify::frf::{
+use quadrant_tune::commission::bootstrap::measuring_settings;
+use quadrant_tune::identify::excitation::{Excitation, Waveform};
+use quadrant_tune::identify::frf::{
     FrfMeasurement, FrfSettings, SavedSettings, measure, response_of,
 };
-use quadrant_sim::identify::pages::linear::response_section;
-use quadrant_sim::machine::TestAxis;
-use quadrant_sim::report::Brief;
+use quadrant_tune::test_axis::TestAxis;
+use quadrant_written::Brief;
 
 use super::recorded;
 use crate::subject::{Measured, Subject};
-use quadrant_cli::output::{Output, with_bar};
-use quadrant_cli::{say, warn};
 
 /// The settling time of a fresh measurement, s.
 const SETTLING_S: f64 = 0.7;

@@ -3,20 +3,20 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use quadrant_cli::output::{Output, with_bar};
 use quadrant_law::friction::FrictionSettings;
+use quadrant_pages::identify::friction::{friction_section, friction_table};
 use quadrant_settings::AxisSettings;
-use quadrant_sim::commission::bootstrap::measuring_settings;
-use quadrant_sim::identify::pages::friction::{friction_section, friction_table};
-use quadrant_sim::identify::single_state::with_all_models;
-use quadrant_sim::identify::static_friction::{
+use quadrant_tune::commission::bootstrap::measuring_settings;
+use quadrant_tune::identify::single_state::with_all_models;
+use quadrant_tune::identify::static_friction::{
     Exponent, FrictionMap, StaticFrictionSettings, fit_map, measure,
 };
-use quadrant_sim::machine::TestAxis;
-use quadrant_sim::record::Recording;
+use quadrant_tune::record::Recording;
+use quadrant_tune::test_axis::TestAxis;
 
 use super::recorded;
 use crate::subject::{Destination, Subject};
-use quadrant_cli::output::{Output, with_bar};
 
 /// Options of `quadrant identify static-friction`.
 #[derive(Clone, Debug, Args)]

@@ -4,24 +4,24 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail, ensure};
 use clap::Args;
+use quadrant_cli::output::{Output, command_line, share, with_bar};
+use quadrant_cli::{say, warn};
+use quadrant_pages::identify::motion::{
+    Reruns, candidates_table, motion_page, motion_table, validation_table,
+};
+use quadrant_pages::parts::provenance;
 use quadrant_settings::StageSettings;
-use quadrant_sim::identify::motion::{
+use quadrant_tune::identify::motion::{
     Candidate, CascadeLoop, MotionFitSettings, Signals, fit_motion, recommended, recommended_by,
     refined, replay_closed_loop, replay_open_loop, shuttle, validate,
 };
-use quadrant_sim::identify::pages::motion::{
-    Reruns, candidates_table, motion_page, motion_table, validation_table,
-};
-use quadrant_sim::machine::TestAxis;
-use quadrant_sim::pages::provenance;
-use quadrant_sim::record::{ColumnNames, MotionOptions, Recording};
+use quadrant_tune::record::{ColumnNames, MotionOptions, Recording};
+use quadrant_tune::test_axis::TestAxis;
 
 use super::friction::put_friction;
 use super::recorded;
 use crate::numbers::Numbers;
 use crate::subject::{Destination, Subject};
-use quadrant_cli::output::{Output, command_line, share, with_bar};
-use quadrant_cli::{say, warn};
 
 /// Options of `quadrant identify motion`.
 #[derive(Clone, Debug, Args)]

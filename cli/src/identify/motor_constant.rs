@@ -3,18 +3,18 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use quadrant_cli::output::{Output, with_bar};
+use quadrant_pages::identify::linear::motor_constant_table;
+use quadrant_pages::identify::motor_constant::motor_constant_section;
 use quadrant_settings::AxisSettings;
-use quadrant_sim::commission::bootstrap::{bootstrap_settings, zero_gain_settings};
-use quadrant_sim::identify::motor_constant::{
+use quadrant_tune::commission::bootstrap::{bootstrap_settings, zero_gain_settings};
+use quadrant_tune::identify::motor_constant::{
     MotorConstant, MotorConstantSettings, evaluate, measure,
 };
-use quadrant_sim::identify::pages::linear::motor_constant_table;
-use quadrant_sim::identify::pages::motor_constant::motor_constant_section;
-use quadrant_sim::machine::TestAxis;
+use quadrant_tune::test_axis::TestAxis;
 
 use super::recorded;
 use crate::subject::{Destination, Subject};
-use quadrant_cli::output::{Output, with_bar};
 
 /// Options of `quadrant identify motor-constant`.
 #[derive(Clone, Debug, Args)]

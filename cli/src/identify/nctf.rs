@@ -3,20 +3,20 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use quadrant_cli::axis::Axis;
+use quadrant_cli::output::{Output, with_bar};
 use quadrant_law::control::nctf::NctfGains;
 use quadrant_law::control::surface::SurfaceGains;
+use quadrant_pages::identify::characteristic::{characteristic_section, characteristic_table};
 use quadrant_settings::AxisSettings;
-use quadrant_sim::commission::bootstrap::zero_gain_settings;
-use quadrant_sim::identify::characteristic::{
+use quadrant_tune::commission::bootstrap::zero_gain_settings;
+use quadrant_tune::identify::characteristic::{
     Characteristic, CharacteristicSettings, evaluate, measure,
 };
-use quadrant_sim::identify::pages::characteristic::{characteristic_section, characteristic_table};
-use quadrant_sim::machine::TestAxis;
+use quadrant_tune::test_axis::TestAxis;
 
 use super::recorded;
 use crate::subject::{Destination, Subject};
-use quadrant_cli::axis::Axis;
-use quadrant_cli::output::{Output, with_bar};
 
 /// Options of `quadrant identify nctf`.
 #[derive(Clone, Debug, Args)]

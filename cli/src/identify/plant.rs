@@ -4,12 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use quadrant_cli::output::Output;
-use quadrant_sim::identify::pages::linear::{
-    fitted_response_section, plant_tables, response_section,
-};
-use quadrant_sim::identify::plant::{PlantFitSettings, Stiffness, fit_plant};
-use quadrant_sim::identify::response::FrequencyResponse;
-use quadrant_sim::report::Block;
+use quadrant_pages::identify::linear::{fitted_response_section, plant_tables, response_section};
+use quadrant_report::Block;
+use quadrant_tune::identify::plant::{PlantFitSettings, Stiffness, fit_plant};
+use quadrant_tune::identify::response::FrequencyResponse;
 
 use super::frf::Measurement;
 use super::recorded;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use indicatif::ProgressDrawTarget;
 use quadrant_cli::output::share;
 use quadrant_cli::warn;
-use quadrant_sim::record::{MotionOptions, Recording};
+use quadrant_tune::record::{MotionOptions, Recording};
 
 /// Reading that is done sooner needs no bar.
 const PATIENCE: Duration = Duration::from_secs(2);

@@ -6,20 +6,20 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use clap::Args;
 use indicatif::ProgressBar;
+use quadrant_cli::axis::Axis;
 use quadrant_cli::output::{Output, command_line, share};
+use quadrant_pages::identify::revise::{AmplitudeResponse, revise_page, revise_table};
+use quadrant_pages::parts::provenance;
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::commission::{CommissionSettings, commission};
-use quadrant_sim::identify::at_rest::AtRest;
-use quadrant_sim::identify::excitation::{Excitation, Waveform};
-use quadrant_sim::identify::pages::revise::{AmplitudeResponse, revise_page, revise_table};
-use quadrant_sim::identify::revise::ExplicitFriction;
-use quadrant_sim::pages::provenance;
+use quadrant_tune::commission::{CommissionSettings, commission};
+use quadrant_tune::identify::at_rest::AtRest;
+use quadrant_tune::identify::excitation::{Excitation, Waveform};
+use quadrant_tune::identify::revise::ExplicitFriction;
 
 use super::recorded;
 use crate::endpoint::Endpoint;
 use crate::numbers::Numbers;
 use crate::subject::Subject;
-use quadrant_cli::axis::Axis;
 
 /// Options of `quadrant identify revise`.
 #[derive(Clone, Debug, Args)]

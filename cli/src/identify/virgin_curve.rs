@@ -4,20 +4,20 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
+use quadrant_cli::output::{Output, with_bar};
+use quadrant_cli::say;
+use quadrant_pages::identify::friction::{gms_table, presliding_section};
 use quadrant_settings::AxisSettings;
-use quadrant_sim::commission::bootstrap::low_bandwidth_settings;
-use quadrant_sim::identify::pages::friction::{gms_table, presliding_section};
-use quadrant_sim::identify::single_state::with_all_models;
-use quadrant_sim::identify::virgin_curve::{Knots, VirginCurveSettings, identify, measure};
-use quadrant_sim::machine::TestAxis;
-use quadrant_sim::record::Recording;
+use quadrant_tune::commission::bootstrap::low_bandwidth_settings;
+use quadrant_tune::identify::single_state::with_all_models;
+use quadrant_tune::identify::virgin_curve::{Knots, VirginCurveSettings, identify, measure};
+use quadrant_tune::record::Recording;
+use quadrant_tune::test_axis::TestAxis;
 
 use super::friction::put_friction;
 use super::recorded;
 use crate::numbers::Numbers;
 use crate::subject::{Destination, Subject};
-use quadrant_cli::output::{Output, with_bar};
-use quadrant_cli::say;
 
 /// Options of `quadrant identify virgin-curve`.
 #[derive(Clone, Debug, Args)]

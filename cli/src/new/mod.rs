@@ -12,10 +12,11 @@ use quadrant_cli::output::{command_line, quoted};
 use quadrant_cli::{say, warn};
 use quadrant_law::axes::AxisName;
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::machine::{Travel, enter_limits};
-use quadrant_sim::report::whole;
 use quadrant_sim::settings_file::{SettingsFile, defaults_at, without_law};
 use quadrant_sim::stage_file::DataSheet;
+use quadrant_sim::stage_setup::enter_limits;
+use quadrant_tune::test_axis::Travel;
+use quadrant_written::whole;
 
 use self::ask::Questions;
 use self::presets::{Amplifier, Encoder};

@@ -1,6 +1,6 @@
 //! Curves in characters, one sign a run.
 
-use quadrant_sim::client::plot::number;
+use quadrant_host::client::plot::number;
 
 /// Sign of each run; a place that several runs take has that of the last.
 const SIGNS: [char; 6] = ['*', 'o', '+', 'x', '#', '@'];

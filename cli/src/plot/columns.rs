@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use quadrant_cli::warn;
-use quadrant_sim::record::{ColumnNames, NumberTable};
+use quadrant_tune::record::{ColumnNames, NumberTable};
 
 /// A run: a file's columns.
 pub(super) struct Run {

@@ -9,10 +9,10 @@ use anyhow::{anyhow, bail, ensure};
 use clap::Args;
 use quadrant_cli::output::command_line;
 use quadrant_cli::{say, terminal};
-use quadrant_sim::record::ColumnNames;
-use quadrant_sim::report::{
+use quadrant_report::{
     Block, Figure, Format, Lines, Page, Plot, Provenance, Section, Series, Style,
 };
+use quadrant_tune::record::ColumnNames;
 
 use self::columns::Run;
 

@@ -1,12 +1,13 @@
 //! `quadrant connect` on the simulated machine: whole sessions, through the command alone.
 
-use crate::command;
 use std::path::Path;
 use std::process::Output;
 
-use quadrant_sim::record::{AxisLimits, Record};
 use quadrant_sim::settings_file::SettingsFile;
+use quadrant_tune::record::{AxisLimits, Record};
 use serde_json::{Value, json};
+
+use crate::command;
 
 const LIMITS: AxisLimits = AxisLimits {
     travel_mm: 410.0,

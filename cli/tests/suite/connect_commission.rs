@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use quadrant_sim::machine::StageSetup;
 use quadrant_sim::settings_file::SettingsFile;
+use quadrant_sim::stage_setup::StageSetup;
 use serde_json::Value;
 
 use crate::command::succeed;

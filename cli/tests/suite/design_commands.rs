@@ -1,17 +1,18 @@
 //! The commands `quadrant design pid` and `npid`, from end to end.
 
-use crate::command;
-use quadrant_settings::response::LinearResponse;
 use std::path::Path;
 
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::filter::FilterSettings;
 use quadrant_settings::StageSettings;
 use quadrant_settings::popov::filtered_sector_bound;
-use quadrant_sim::design::{Form, Process};
-use quadrant_sim::identify::response::{FrequencyResponse, ResponsePoint};
-use quadrant_sim::report::whole;
+use quadrant_settings::response::LinearResponse;
 use quadrant_sim::settings_file::SettingsFile;
+use quadrant_tune::design::{Form, Process};
+use quadrant_tune::identify::response::{FrequencyResponse, ResponsePoint};
+use quadrant_written::whole;
+
+use crate::command;
 
 fn succeed(folder: &Path, arguments: &[&str]) -> String {
     command::succeed(folder, &[&["design"], arguments].concat())

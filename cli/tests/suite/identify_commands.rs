@@ -1,14 +1,15 @@
 //! The commands `quadrant identify frf`, `plant` and `motion`, from end to end.
 
-use crate::command;
 use std::fs;
 use std::path::Path;
 
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::identify::response::FrequencyResponse;
-use quadrant_sim::machine::StageSetup;
-use quadrant_sim::report::whole;
 use quadrant_sim::settings_file::SettingsFile;
+use quadrant_sim::stage_setup::StageSetup;
+use quadrant_tune::identify::response::FrequencyResponse;
+use quadrant_written::whole;
+
+use crate::command;
 
 fn succeed(folder: &Path, arguments: &[&str]) -> String {
     command::succeed(folder, &[&["identify"], arguments].concat())

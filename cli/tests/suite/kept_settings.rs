@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use crate::command::{fail, succeed};
 use quadrant_settings::StageSettings;
-use quadrant_sim::report::whole;
 use quadrant_sim::setting_value::changes;
 use quadrant_sim::settings_file::SettingsFile;
+use quadrant_written::whole;
+
+use crate::command::{fail, succeed};
 
 /// The file in which a commissioning leaves its settings by default.
 const LEFT: &str = "quadrant-out/settings.toml";

@@ -1,6 +1,5 @@
 //! Recordings that are spoilt, through the commands: each is refused with its place and a remedy, none is identified from.
 
-use crate::command;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -8,8 +7,10 @@ use std::process::Command;
 use std::sync::LazyLock;
 
 use proptest::prelude::*;
-use quadrant_sim::record::Recording;
+use quadrant_tune::record::Recording;
 use tempfile::TempDir;
+
+use crate::command;
 
 /// Runs `quadrant identify`; what it said, and whether it succeeded.
 fn identify(folder: &Path, arguments: &[&str]) -> (bool, String) {

@@ -8,11 +8,10 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use quadrant_sim::identify::excitation::{Excitation, Waveform};
-use quadrant_sim::machine::{Drive, Experiment, SimulatedTestAxis, TestAxis};
 use quadrant_sim::plant::StageParameters;
-use quadrant_sim::record::RecordError;
-use quadrant_sim::record::Recording;
+use quadrant_tune::identify::excitation::{Excitation, Waveform};
+use quadrant_tune::record::{RecordError, Recording};
+use quadrant_tune::test_axis::{Drive, Experiment, SimulatedTestAxis, TestAxis};
 
 const ROWS: usize = 10_000_000;
 /// Rows of a stretch that repeats in the file.

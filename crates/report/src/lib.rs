@@ -41,10 +41,8 @@ mod polar;
 mod print;
 mod samples;
 mod scale;
-mod shown;
 mod style;
 mod table;
-pub mod whole;
 mod wrap;
 mod write;
 
@@ -58,7 +56,6 @@ pub use palette::Colour;
 pub use polar::{DeviationTrace, Magnification, PolarDeviation};
 pub use print::stacked_svg;
 pub use scale::Scale;
-pub use shown::{Brief, fixed};
 pub use style::{Dash, Style};
 pub use table::{Cell, Column, Table};
 pub use wrap::wrapped;

@@ -10,10 +10,10 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::element::{Circle, DashedPathElement, EmptyElement, PathElement, Polygon, Text};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use quadrant_written::fixed;
 
 use super::drawing::{Axis, Curve, Drawing, Shape};
 use super::mark::Mark;
-use super::shown::fixed;
 use super::{Figure, Plot, ReportError};
 
 /// Width of an image, px: at 96 px to the inch that of a printed page's text.

@@ -1,11 +1,13 @@
 //! Tables: one value, three readers (page, terminal, spreadsheet).
 
-use super::ReportError;
-use super::shown::fixed;
-use super::wrap::wrapped;
-use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, TableStyle};
-use serde::{Deserialize, Serialize};
 use std::path::Path;
+
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, TableStyle};
+use quadrant_written::fixed;
+use serde::{Deserialize, Serialize};
+
+use super::ReportError;
+use super::wrap::wrapped;
 
 /// Rules above, below and under the head, as in print.
 const RULED: TableStyle = TableStyle::new()
@@ -168,7 +170,7 @@ impl Table {
 
     /// Writes [`Self::to_csv`] into a file.
     pub fn write_csv(&self, path: &Path) -> Result<(), ReportError> {
-        crate::whole::write(path, self.to_csv()?).map_err(|source| ReportError::Write {
+        quadrant_written::whole::write(path, self.to_csv()?).map_err(|source| ReportError::Write {
             path: path.to_owned(),
             source,
         })

@@ -1,9 +1,11 @@
 //! A page as files, in the formats its readers want.
 
-use super::whole;
-use super::{Dots, Figure, Lines, Page, Plot, PolarDeviation, ReportError};
-use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+
+use quadrant_written::whole;
+use serde::{Deserialize, Serialize};
+
+use super::{Dots, Figure, Lines, Page, Plot, PolarDeviation, ReportError};
 
 /// Names the meaning of a page's JSON; a change of meaning changes the number.
 const SCHEMA: &str = "quadrant-report/1";

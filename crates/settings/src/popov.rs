@@ -368,7 +368,7 @@ impl PopovPlot {
 
 #[cfg(test)]
 mod tests {
-    //! Tests of the Popov bound. Its confirmation by running the loop is in `quadrant-sim`, beside the margins.
+    //! Tests of the Popov bound. Its confirmation by running the loop is in `quadrant-tune`, beside the designs.
 
     use proptest::prelude::*;
 

@@ -21,9 +21,8 @@ use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::Outputs;
 use quadrant_law::units::DacCode;
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::machine::benchmark_job::circle_and_sine;
-use quadrant_sim::machine::law::TickInput;
-use quadrant_sim::machine::{LawMachine, Operator};
+use quadrant_sim::benchmark_job::circle_and_sine;
+use quadrant_sim::law_machine::{LawMachine, Operator, TickInput};
 use quadrant_sim::plant::{
     AxisParameters, PLANT_ELEMENTS, SUBSTEPS, SimulatedStage, StageParameters,
 };

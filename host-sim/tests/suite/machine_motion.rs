@@ -13,7 +13,7 @@ use quadrant_law::units::Position;
 use quadrant_settings::Job;
 use quadrant_settings::stream_planner::{AxisPoint, SetPoint, StreamPlanner};
 use quadrant_settings::{PlanSettings, StageSettings};
-use quadrant_sim::machine::LawMachine;
+use quadrant_sim::law_machine::LawMachine;
 use quadrant_sim::plant::{MarkParameters, SimulatedStage, StageParameters};
 
 /// Length of a count, mm.

@@ -6,8 +6,7 @@ use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::{FaultCode, SafetyState};
 use quadrant_settings::Job;
 use quadrant_settings::{PlanSettings, StageSettings};
-use quadrant_sim::machine::law::TickInput;
-use quadrant_sim::machine::{LawMachine, Operator};
+use quadrant_sim::law_machine::{LawMachine, Operator, TickInput};
 use quadrant_sim::plant::{SimulatedAxis, StageParameters};
 
 /// Enables and starts the plan, and what follows.

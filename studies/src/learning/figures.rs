@@ -1,9 +1,9 @@
 //! The study's figures: the scale settling after a step of friction, and a slot with and without.
 
+use quadrant_pages::parts::{lines, series};
+use quadrant_report::{Figure, Series, Style, decimate};
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::pages::{lines, series};
 use quadrant_sim::plant::cutting::Milling;
-use quadrant_sim::report::{Figure, Series, Style, decimate};
 
 use super::run::{Phase, SINE, Trace, cycle_s, nominal, run, slot, under_pid};
 use crate::competitor::Feedforward;

@@ -8,7 +8,7 @@ mod starts;
 
 use clap::{Args, ValueEnum};
 use quadrant_cli::law_settings::LawSettings;
-use quadrant_sim::report::{Block, Section};
+use quadrant_report::{Block, Section};
 
 use crate::study::{Advance, Study, results};
 

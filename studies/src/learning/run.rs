@@ -7,7 +7,7 @@ use quadrant_law::control::feedback::LawKind;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::SafetyState;
 use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
-use quadrant_sim::machine::law::TickInput;
+use quadrant_sim::law_machine::TickInput;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::Load;
 use quadrant_sim::plant::{AxisParameters, NEWTONS_PER_VOLT, SimulatedAxis, StageParameters};

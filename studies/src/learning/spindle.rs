@@ -1,9 +1,9 @@
 //! The slot with cancelling, whose speed setting differs from the spindle's, or passes it in a ramp.
 
 use quadrant_law::cancelling::CancellingSettings;
+use quadrant_report::{Cell, Column, Table};
 use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::plant::cutting::Milling;
-use quadrant_sim::report::{Cell, Column, Table};
 use rayon::prelude::*;
 
 use super::run::{Phase, SINE, cycle_s, nominal, run, slot, under_pid};

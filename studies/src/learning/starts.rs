@@ -1,8 +1,8 @@
 //! Learning that begins with the wrong friction: gains of the settings, a history, and values of a catalogue.
 
 use quadrant_law::friction::gms::{GmsElement, GmsElements, GmsParameters};
+use quadrant_report::{Cell, Column, Table};
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::report::{Cell, Column, Table};
 use rayon::prelude::*;
 
 use super::run::{Phase, SINE, cycle_s, nominal, run, under_pid};

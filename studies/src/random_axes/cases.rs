@@ -3,10 +3,10 @@
 use quadrant_cli::say;
 use quadrant_law::friction::dahl::DahlParameters;
 use quadrant_law::friction::lugre::LugreParameters;
-use quadrant_sim::machine::Travel;
 use quadrant_sim::plant::{
     AxisParameters, Backlash, Drive, EncoderSide, FrictionParameters, StageParameters,
 };
+use quadrant_tune::test_axis::Travel;
 
 use super::subject::Subject;
 use super::{Line, Outcome, Path, judge_subject};

@@ -15,23 +15,24 @@ use std::time::Instant;
 use clap::Args;
 use quadrant_cli::warn;
 
+use quadrant_host::client::{Client, ClientError};
+use quadrant_host::machine::{Machine, SimulatedLink};
 use quadrant_law::axes::AxisName;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::client::{Client, ClientError};
-use quadrant_sim::commission::bootstrap::{self, measuring_settings};
-use quadrant_sim::commission::verify::run_sine;
-use quadrant_sim::commission::{CommissionError, CommissionSettings, Commissioned, commission};
-use quadrant_sim::design::DesignError;
-use quadrant_sim::experiment::metrics::worst_and_mean;
-use quadrant_sim::experiment::sine_test::SineTest;
-use quadrant_sim::identify::plant::PlantError;
-use quadrant_sim::machine::{
-    AxisInfo, Experiment, ExperimentError, Machine, MachineError, SimulatedLink, SimulatedTestAxis,
-    StageSetup, TestAxis, approach,
-};
+use quadrant_sim::metrics::worst_and_mean;
 use quadrant_sim::plant::StageParameters;
-use quadrant_sim::record::Recording;
+use quadrant_sim::sine_test::SineTest;
+use quadrant_sim::stage_setup::StageSetup;
+use quadrant_tune::commission::bootstrap::{self, measuring_settings};
+use quadrant_tune::commission::verify::run_sine;
+use quadrant_tune::commission::{CommissionError, CommissionSettings, Commissioned, commission};
+use quadrant_tune::design::DesignError;
+use quadrant_tune::identify::plant::PlantError;
+use quadrant_tune::record::Recording;
+use quadrant_tune::test_axis::{
+    AxisInfo, Experiment, ExperimentError, MachineError, SimulatedTestAxis, TestAxis, approach,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::campaign::{Campaign, Lines, make_folder};

@@ -2,11 +2,11 @@
 
 use quadrant_cli::output::command_line;
 use quadrant_law::friction::stribeck::StaticFriction;
-use quadrant_sim::commission::page::commission_page;
-use quadrant_sim::commission::verify::{LawResult, Verification};
-use quadrant_sim::experiment::sine_test::SineTest;
-use quadrant_sim::pages::{UM_PER_MM, columns, lines, provenance, series};
-use quadrant_sim::report::{Block, Cell, Column, Figure, Page, Section, Series, Style, Table};
+use quadrant_pages::commission::commission_page;
+use quadrant_pages::parts::{UM_PER_MM, columns, lines, provenance, series};
+use quadrant_report::{Block, Cell, Column, Figure, Page, Section, Series, Style, Table};
+use quadrant_sim::sine_test::SineTest;
+use quadrant_tune::commission::verify::{LawResult, Verification};
 
 use super::{Judged, Subject};
 

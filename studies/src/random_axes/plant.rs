@@ -7,11 +7,11 @@ use quadrant_law::friction::dahl::DahlParameters;
 use quadrant_law::friction::lugre::LugreParameters;
 use quadrant_law::friction::smoothed_gms::SmoothedGmsParameters;
 use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
-use quadrant_sim::machine::Travel;
 use quadrant_sim::plant::{
     AxisParameters, Backlash, Cogging, Drive, EncoderSide, FrictionParameters, PLANT_ELEMENTS,
     StageParameters, virgin_curve_elements,
 };
+use quadrant_tune::test_axis::Travel;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 

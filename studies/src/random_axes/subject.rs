@@ -1,7 +1,7 @@
 //! An axis that is commissioned and judged.
 
-use quadrant_sim::machine::Travel;
 use quadrant_sim::plant::AxisParameters;
+use quadrant_tune::test_axis::Travel;
 
 /// An axis that is commissioned and judged.
 #[derive(Clone, Debug)]

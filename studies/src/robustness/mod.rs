@@ -15,13 +15,13 @@ use quadrant_cli::axis::Axis;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::safety::Fault;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::statistic::Statistic;
+use quadrant_report::Section;
 use quadrant_settings::StageSettings;
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::metrics::Score;
-use quadrant_sim::experiment::statistic::Statistic;
+use quadrant_sim::metrics::Score;
 use quadrant_sim::plant::load::Force;
-use quadrant_sim::record::ForceRecord;
-use quadrant_sim::report::Section;
+use quadrant_tune::record::ForceRecord;
 use rayon::prelude::*;
 
 use crate::competitor::Feedforward;

@@ -1,8 +1,8 @@
 //! The robustness experiment's tables: one for each score, and one of everything.
 
-use quadrant_sim::experiment::metrics::{Metric, Score, change_percent};
-use quadrant_sim::pages::{UM_PER_MM, statistic_cells};
-use quadrant_sim::report::{Block, Cell, Column, Table};
+use quadrant_pages::parts::{UM_PER_MM, statistic_cells};
+use quadrant_report::{Block, Cell, Column, Table};
+use quadrant_sim::metrics::{Metric, Score, change_percent};
 
 use super::{Outcome, Request, baseline, find};
 

@@ -5,13 +5,13 @@ use std::f64::consts::TAU;
 use anyhow::{Context, bail};
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant_law::safety::{Fault, SafetyState};
+use quadrant_pages::compare::sine::AMPLITUDE_MM;
 use quadrant_settings::StageSettings;
-use quadrant_sim::compare::sine::AMPLITUDE_MM;
-use quadrant_sim::experiment::metrics::{Score, largest, rms, score};
-use quadrant_sim::experiment::run::AxisTrace;
-use quadrant_sim::machine::Operator;
-use quadrant_sim::machine::law::TickInput;
+use quadrant_sim::law_machine::Operator;
+use quadrant_sim::law_machine::TickInput;
+use quadrant_sim::metrics::{Score, largest, rms, score};
 use quadrant_sim::plant::SimulatedAxis;
+use quadrant_sim::run::AxisTrace;
 
 use super::Scenario;
 use crate::x_alone::law_of;

@@ -1,16 +1,16 @@
 //! Chapter 3 of the thesis on our stage: from experiments to a plant model with friction.
 
+use quadrant_pages::identify::friction::{friction_section, presliding_section};
+use quadrant_pages::identify::linear::{plant_tables, response_section};
+use quadrant_pages::identify::motor_constant::motor_constant_section;
+use quadrant_pages::identify::revise::revise_sections;
+use quadrant_pages::parts::{lines, series};
+use quadrant_report::{Block, Colour, Figure, Section, Style};
 use quadrant_settings::StageSettings;
-use quadrant_sim::commission::{CommissionSettings, Commissioned, CrossCheck, commission};
-use quadrant_sim::identify::pages::friction::{friction_section, presliding_section};
-use quadrant_sim::identify::pages::linear::{plant_tables, response_section};
-use quadrant_sim::identify::pages::motor_constant::motor_constant_section;
-use quadrant_sim::identify::pages::revise::revise_sections;
-use quadrant_sim::machine::SimulatedTestAxis;
-use quadrant_sim::pages::{lines, series};
 use quadrant_sim::plant::StageParameters;
-use quadrant_sim::record::Recording;
-use quadrant_sim::report::{Block, Colour, Figure, Section, Style};
+use quadrant_tune::commission::{CommissionSettings, Commissioned, CrossCheck, commission};
+use quadrant_tune::record::Recording;
+use quadrant_tune::test_axis::SimulatedTestAxis;
 
 use super::Context;
 use super::numbers::{Number, number};

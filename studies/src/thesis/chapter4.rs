@@ -2,19 +2,19 @@
 
 use anyhow::Context as _;
 use quadrant_law::control::plant_model::PlantModel;
+use quadrant_pages::compare::comparison::AMPLITUDES_MM;
+use quadrant_pages::compare::sine::{CYCLES, SCORED_CYCLES, VELOCITIES_MM_S, cycle_s};
+use quadrant_pages::design::npid::NonlinearPage;
+use quadrant_pages::design::pid::PidPage;
+use quadrant_pages::parts::{columns, provenance};
+use quadrant_report::{Block, Cell, Section, Table};
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::compare::comparison::AMPLITUDES_MM;
-use quadrant_sim::compare::sine::{CYCLES, SCORED_CYCLES, VELOCITIES_MM_S, cycle_s};
-use quadrant_sim::design::npid::filtered_proof;
-use quadrant_sim::design::pages::npid::NonlinearPage;
-use quadrant_sim::design::pages::pid::PidPage;
-use quadrant_sim::design::robustness::{Uncertainty, robustness};
-use quadrant_sim::design::step_response::{StepRequest, step_response};
-use quadrant_sim::design::time_varying::VaryingLoop;
-use quadrant_sim::design::{Form, Process, best_pid};
-use quadrant_sim::pages::{columns, provenance};
 use quadrant_sim::plant::{AxisParameters, StageParameters};
-use quadrant_sim::report::{Block, Cell, Section, Table};
+use quadrant_tune::design::npid::filtered_proof;
+use quadrant_tune::design::robustness::{Uncertainty, robustness};
+use quadrant_tune::design::step_response::{StepRequest, step_response};
+use quadrant_tune::design::time_varying::VaryingLoop;
+use quadrant_tune::design::{Form, Process, best_pid};
 
 use super::Context;
 use super::numbers::{Number, number};

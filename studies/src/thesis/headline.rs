@@ -1,14 +1,14 @@
 //! The thesis' headline figures beside ours, and the share of each imperfection in what they lack.
 
-use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Comparison};
-use quadrant_sim::compare::headlines::{HEADLINE_PROSE, headline_table};
-use quadrant_sim::compare::sine::VELOCITIES_MM_S;
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::metrics::Metric;
-use quadrant_sim::experiment::run_configuration::ModelKnowledge;
-use quadrant_sim::experiment::statistic::Statistic;
-use quadrant_sim::pages::{UM_PER_MM, statistic_cells};
-use quadrant_sim::report::{Block, Cell, Column, Section, Table};
+use quadrant_pages::compare::comparison::{AMPLITUDES_MM, Comparison};
+use quadrant_pages::compare::headlines::{HEADLINE_PROSE, headline_table};
+use quadrant_pages::compare::sine::VELOCITIES_MM_S;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::ModelKnowledge;
+use quadrant_pages::experiment::statistic::Statistic;
+use quadrant_pages::parts::{UM_PER_MM, statistic_cells};
+use quadrant_report::{Block, Cell, Column, Section, Table};
+use quadrant_sim::metrics::Metric;
 
 use super::Context;
 use super::imperfections::{Change, Finding, study};

@@ -3,15 +3,15 @@
 
 use anyhow::Context as _;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant_sim::commission::bootstrap::low_bandwidth_settings;
-use quadrant_sim::compare::comparison::{Comparison, Request};
-use quadrant_sim::compare::sine::Sines;
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::run_configuration::RunConfiguration;
-use quadrant_sim::identify::virgin_curve::{self, Knots, VirginCurveSettings};
-use quadrant_sim::machine::{SimulatedTestAxis, TestAxis, approach};
+use quadrant_pages::compare::comparison::{Comparison, Request};
+use quadrant_pages::compare::sine::Sines;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::plant::Imperfections;
+use quadrant_sim::run::RunError;
+use quadrant_tune::commission::bootstrap::low_bandwidth_settings;
+use quadrant_tune::identify::virgin_curve::{self, Knots, VirginCurveSettings};
+use quadrant_tune::test_axis::{SimulatedTestAxis, TestAxis, approach};
 use rayon::prelude::*;
 
 use crate::study::Advance;

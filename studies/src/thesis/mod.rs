@@ -14,12 +14,12 @@ use std::sync::OnceLock;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use quadrant_cli::law_settings::LawSettings;
-use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Comparison, Request};
-use quadrant_sim::compare::sine::Sines;
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::RunConfiguration;
-use quadrant_sim::pages::provenance;
-use quadrant_sim::report::Section;
+use quadrant_pages::compare::comparison::{AMPLITUDES_MM, Comparison, Request};
+use quadrant_pages::compare::sine::Sines;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
+use quadrant_pages::parts::provenance;
+use quadrant_report::Section;
 use quadrant_sim::settings_file::SettingsFile;
 
 use crate::study::{Advance, Study};

@@ -1,6 +1,6 @@
 //! The thesis' numbers on sections that other pages have too.
 
-use quadrant_sim::report::{Block, Section};
+use quadrant_report::{Block, Section};
 
 /// The thesis' number of a block: the block's id, and "Table 3.1" or "Figure 3.5a".
 pub(super) type Number = (&'static str, &'static str);

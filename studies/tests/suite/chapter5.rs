@@ -2,16 +2,15 @@
 
 use std::collections::HashMap;
 
-use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Comparison, Entry, Request};
-use quadrant_sim::compare::sine::{Sines, VELOCITIES_MM_S};
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::metrics::Score;
-use quadrant_sim::experiment::run::AxisTrace;
-use quadrant_sim::experiment::run_configuration::{
-    ModelKnowledge, RunConfiguration, identified_settings,
-};
-use quadrant_sim::pages::provenance;
-use quadrant_sim::report::{Block, Cell, Page, Section, Table};
+use quadrant_pages::compare::comparison::{AMPLITUDES_MM, Comparison, Entry, Request};
+use quadrant_pages::compare::sine::{Sines, VELOCITIES_MM_S};
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::{ModelKnowledge, RunConfiguration};
+use quadrant_pages::parts::provenance;
+use quadrant_report::{Block, Cell, Page, Section, Table};
+use quadrant_sim::identified_stage::identified_settings;
+use quadrant_sim::metrics::Score;
+use quadrant_sim::run::AxisTrace;
 use quadrant_studies::thesis::chapter5::chapter5_sections;
 use quadrant_studies::thesis::headline::{headline_section, study_section};
 use quadrant_studies::thesis::imperfections::{Change, study};

@@ -1,8 +1,8 @@
 //! Commissioning of axes that nobody tuned it on.
 
-use quadrant_sim::machine::Travel;
 use quadrant_studies::random_axes::cases::cases;
 use quadrant_studies::random_axes::{Outcome, Path, RandomAxis, judge, judge_subject};
+use quadrant_tune::test_axis::Travel;
 use rayon::prelude::*;
 
 #[test]

@@ -3,17 +3,18 @@
 use std::sync::Arc;
 
 use quadrant_law::safety::FaultCode;
+use quadrant_pages::compare::sine::run_configuration;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::RunConfiguration;
 use quadrant_settings::StageSettings;
-use quadrant_sim::compare::sine::run_configuration;
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
+use quadrant_sim::identified_stage::identified_settings;
 use quadrant_sim::plant::NEWTONS_PER_VOLT;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::{Force, Load};
-use quadrant_sim::record::ForceRecord;
 use quadrant_studies::robustness::{
     Outcome, Request, Task, baseline, find, run as run_scenarios, scenarios, usual_competitors,
 };
+use quadrant_tune::record::ForceRecord;
 
 use crate::command::{fail, succeed};
 

@@ -3,11 +3,11 @@
 
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant_settings::{AxisSettings, StageSettings};
-use quadrant_sim::commission::Guard;
-use quadrant_sim::commission::bootstrap::{bootstrap_settings, zero_gain_settings};
-use quadrant_sim::identify::motor_constant::{self, MotorConstant, MotorConstantSettings};
-use quadrant_sim::machine::{Drive, Experiment, SimulatedTestAxis, TestAxis, Travel, approach};
 use quadrant_studies::random_axes::RandomAxis;
+use quadrant_tune::commission::Guard;
+use quadrant_tune::commission::bootstrap::{bootstrap_settings, zero_gain_settings};
+use quadrant_tune::identify::motor_constant::{self, MotorConstant, MotorConstantSettings};
+use quadrant_tune::test_axis::{Drive, Experiment, SimulatedTestAxis, TestAxis, Travel, approach};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;

@@ -1,6 +1,6 @@
 //! Feedforward whose model is made wrong on purpose.
 
-use quadrant_sim::experiment::run_configuration::identified_settings;
+use quadrant_sim::identified_stage::identified_settings;
 use quadrant_studies::wrong_model::{Wrong, with_wrong_model};
 
 #[test]

@@ -3,19 +3,19 @@
 use anyhow::{Result, anyhow, ensure};
 use quadrant::lockstep::{InjectedFault, Mode, OUTPUT, OutputRecord};
 use quadrant::store::{BUFFER_BYTES, Provenance, Store};
+use quadrant_host::machine::emulator::{Clock, Emulator, Memory};
+use quadrant_host::machine::memory_flash::MemoryFlash;
 use quadrant_law::friction::gms::{FIRMWARE_ELEMENTS, GmsElement};
 use quadrant_law::safety::FaultCode;
 use quadrant_law::stage::Outputs;
 use quadrant_settings::StageSettings;
-use quadrant_sim::machine::memory_flash::MemoryFlash;
+use xtask::image::Image;
 
 use super::approach::moving;
 use super::case::configuration;
 use super::finding::{Finding, latched, log_contains};
 use super::fixture::Fixture;
 use crate::reference_model;
-use quadrant_sim::machine::emulator::{Clock, Emulator, Memory};
-use xtask::image::Image;
 
 /// Ends of a firmware, the fault that the next one finds, and its words for it.
 const RESETS: [(&str, InjectedFault, FaultCode, &str); 5] = [

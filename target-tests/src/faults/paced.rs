@@ -5,14 +5,14 @@ use quadrant::lockstep::{
     HANGS_FROM, HANGS_UNTIL, INJECTED_FAULT, INJECTED_FAULT_TICK, InjectedFault, InputRecord, Mode,
     OutputRecord, RECORDED_OUTPUTS,
 };
+use quadrant_host::machine::emulator::{Clock, Emulator, Memory};
 use quadrant_law::safety::FaultCode;
 use quadrant_law::stage::Outputs;
+use xtask::image::Image;
 
 use super::finding::{Finding, are_off, log_contains};
 use crate::lockstep;
 use crate::reference_model::{self, ReferenceModel, SETTLING_TICKS};
-use quadrant_sim::machine::emulator::{Clock, Emulator, Memory};
-use xtask::image::Image;
 
 /// Ticks of the runs.
 const TICKS: u32 = SETTLING_TICKS + 250;

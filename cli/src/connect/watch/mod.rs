@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail, ensure};
 use quadrant_cli::terminal;
-use quadrant_sim::client::Client;
+use quadrant_host::client::Client;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyEventKind};
 use serde_json::json;
@@ -87,9 +87,10 @@ mod tests {
     use clap::Parser;
     use quadrant::app::Translated;
     use quadrant::link::message::{Body, MachineState};
+    use quadrant_host::machine::SimulatedLink;
     use quadrant_law::reference::{MotionSettings, PointToPointSettings};
     use quadrant_settings::PlanSettings;
-    use quadrant_sim::machine::{SimulatedLink, StageSetup};
+    use quadrant_sim::stage_setup::StageSetup;
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
     use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
@@ -152,9 +153,9 @@ mod tests {
     fn an_axis_that_learns_shows_its_scale_beside_three_charts() {
         let (mut client, mut watch) = watched(&[]);
         assert!(!picture(&watch).contains("friction of"));
-        let path = quadrant_sim::client::settings::whole_path("z/feedforward/learning");
-        quadrant_sim::client::settings::set(&mut client, &path, "present").unwrap();
-        quadrant_sim::client::settings::apply(&mut client).unwrap();
+        let path = quadrant_host::client::settings::whole_path("z/feedforward/learning");
+        quadrant_host::client::settings::set(&mut client, &path, "present").unwrap();
+        quadrant_host::client::settings::apply(&mut client).unwrap();
         twice(&mut client, &mut watch, 'e');
         let seen = picture(&watch);
         assert!(seen.contains("friction of z x 1.000; frozen: "), "{seen}");
@@ -165,8 +166,8 @@ mod tests {
     fn a_gain_is_nudged_and_undone_on_the_machine() {
         let (mut client, mut watch) = watched(&["--gain", "y/feedback/pid/kd_v_s_per_mm"]);
         let of = |client: &mut Client| {
-            let path = quadrant_sim::client::settings::whole_path("y/feedback/pid/kd_v_s_per_mm");
-            let value = quadrant_sim::client::settings::get(client, &path).unwrap();
+            let path = quadrant_host::client::settings::whole_path("y/feedback/pid/kd_v_s_per_mm");
+            let value = quadrant_host::client::settings::get(client, &path).unwrap();
             value.as_f64().unwrap()
         };
         let before = of(&mut client);

@@ -7,11 +7,11 @@ use anyhow::ensure;
 use quadrant::link::message::{
     AxisName, Body, CapturePhase, Channel, FaultReport, Inputs, Learning, Notice, Status, Trigger,
 };
-use quadrant_sim::client::samples::{
+use quadrant_host::client::samples::{
     Samples, TelemetryRecorder, arm, least_decimation, read_capture,
 };
-use quadrant_sim::client::settings::{self, whole_path};
-use quadrant_sim::client::{Client, ClientError, columns};
+use quadrant_host::client::settings::{self, whole_path};
+use quadrant_host::client::{Client, ClientError, columns};
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use crate::connect::command::WatchOptions;

@@ -2,8 +2,8 @@
 
 use quadrant::link::message::{Channel, MachineState};
 use quadrant_cli::terminal::plain;
-use quadrant_sim::client::{columns, with_reset};
-use quadrant_sim::report::fixed;
+use quadrant_host::client::{columns, with_reset};
+use quadrant_written::fixed;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style};

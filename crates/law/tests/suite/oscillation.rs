@@ -11,11 +11,10 @@ use quadrant_law::safety::oscillation::{
 };
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 use quadrant_settings::{PlanSettings, StageSettings};
-use quadrant_simulation::plant::{
+use quadrant_sim::plant::{
     AxisParameters, Backlash, Drive, EncoderSide, FrictionParameters, SimulatedAxis,
     StageParameters,
 };
-
 use quadrant_test_support::{Rig, sine_on_x, x_alone};
 
 pub(crate) struct Bench<S: Scalar> {

@@ -6,12 +6,12 @@ use FeedforwardKind::{Combined, None as Without};
 use ModelKnowledge::Identified;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
-use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Entry};
-use quadrant_sim::compare::sine::{VELOCITIES_MM_S, cycle_s};
-use quadrant_sim::experiment::metrics::GLITCH_WINDOW;
-use quadrant_sim::experiment::run_configuration::ModelKnowledge;
-use quadrant_sim::pages::UM_PER_MM;
-use quadrant_sim::report::{Block, Figure, Lines, Plot, Series, Style, decimate};
+use quadrant_pages::compare::comparison::{AMPLITUDES_MM, Entry};
+use quadrant_pages::compare::sine::{VELOCITIES_MM_S, cycle_s};
+use quadrant_pages::experiment::run_configuration::ModelKnowledge;
+use quadrant_pages::parts::UM_PER_MM;
+use quadrant_report::{Block, Figure, Lines, Plot, Series, Style, decimate};
+use quadrant_sim::metrics::GLITCH_WINDOW;
 
 use crate::thesis::chapter5::{CONTROLLERS, Chapter, knowledge_name};
 

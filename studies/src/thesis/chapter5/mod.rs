@@ -6,12 +6,12 @@ mod tables;
 
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
-use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Comparison, Entry};
-use quadrant_sim::compare::sine::VELOCITIES_MM_S;
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::metrics::GLITCH_WINDOW;
-use quadrant_sim::experiment::run_configuration::ModelKnowledge;
-use quadrant_sim::report::Section;
+use quadrant_pages::compare::comparison::{AMPLITUDES_MM, Comparison, Entry};
+use quadrant_pages::compare::sine::VELOCITIES_MM_S;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::ModelKnowledge;
+use quadrant_report::Section;
+use quadrant_sim::metrics::GLITCH_WINDOW;
 
 use super::Context;
 use crate::study::Advance;

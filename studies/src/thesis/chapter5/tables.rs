@@ -4,13 +4,13 @@ use FeedforwardKind::{Combined, None as Without};
 use ModelKnowledge::{Exact, Identified};
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
-use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Entry};
-use quadrant_sim::compare::sine::VELOCITIES_MM_S;
-use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::metrics::{Metric, change_percent};
-use quadrant_sim::experiment::run_configuration::ModelKnowledge;
-use quadrant_sim::pages::{UM_PER_MM, statistic_cells};
-use quadrant_sim::report::{Block, Cell, Column, Table};
+use quadrant_pages::compare::comparison::{AMPLITUDES_MM, Entry};
+use quadrant_pages::compare::sine::VELOCITIES_MM_S;
+use quadrant_pages::experiment::configuration::Configuration;
+use quadrant_pages::experiment::run_configuration::ModelKnowledge;
+use quadrant_pages::parts::{UM_PER_MM, statistic_cells};
+use quadrant_report::{Block, Cell, Column, Table};
+use quadrant_sim::metrics::{Metric, change_percent};
 
 use crate::thesis::chapter5::{CONTROLLERS, Chapter, knowledge_name};
 

@@ -1,0 +1,329 @@
+//! An axis of a connected machine, under experiments.
+
+use std::time::Duration;
+
+use quadrant::app::Translated;
+use quadrant::link::message::{AxisSignal, Body, Channel, MachineState};
+use quadrant_law::axes::AxisName;
+use quadrant_law::reference::MotionSettings;
+use quadrant_law::safety::FaultCode;
+use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
+use quadrant_tune::record::Recording;
+use quadrant_tune::test_axis::{
+    AxisInfo, Drive, Experiment, ExperimentError, MachineError, TestAxis, Travel, open_loop_mm,
+    room_mm,
+};
+
+use super::injection::Injection;
+use super::recording::Shape;
+use super::stop::{Injected, Stop};
+use crate::client::error::ClientError;
+use crate::client::samples::{TelemetryRecorder, least_decimation};
+use crate::client::session::Client;
+use crate::client::{settings, settle};
+
+/// Time from one look at the telemetry to the next.
+const LOOK: Duration = Duration::from_millis(50);
+/// Least time recorded after the motion, so that the last block has come.
+const TAIL: Duration = Duration::from_millis(30);
+/// The same in control ticks: a block takes time to fill, and the server runs every few ticks.
+const TAIL_TICKS: f64 = 300.0;
+/// Time for a moving axis to come to rest before an experiment.
+const BEFORE: Duration = Duration::from_secs(60);
+/// Faults that end an experiment, and no more.
+const ENDS_EXPERIMENTS: [FaultCode; 3] = [
+    FaultCode::FollowingError,
+    FaultCode::Overspeed,
+    FaultCode::InjectionBounds,
+];
+/// Time in which the axis comes to rest after one of them.
+const COASTING: Duration = Duration::from_millis(500);
+/// Time in which the outputs come on.
+const ENABLING: Duration = Duration::from_millis(100);
+
+/// An axis of a connected machine.
+///
+/// Experiments run under the machine's own limits and faults, and are recorded by telemetry: as often as they ask for, if
+/// the line carries three channels so often, else as often as it does; a sample's voltage is the mean over all of its
+/// control periods in any case. Positions are counted from the middle of the travel.
+pub struct ConnectedAxis<'a> {
+    client: &'a mut Client,
+    axis: AxisName,
+    stage: StageSettings,
+    travel: Travel,
+    /// The machine's position of the middle of the travel, mm.
+    origin_mm: f64,
+    /// The recording of the last experiment, if that was stopped.
+    interrupted: Option<Recording>,
+}
+
+impl<'a> ConnectedAxis<'a> {
+    /// An axis of the machine, whose settings in force are read. Experiments keep it within `travel` of where it stands.
+    ///
+    /// # Errors
+    /// A draft that is edited, a motion that is under way, a connection that is broken, or a machine of another release.
+    pub fn new(
+        client: &'a mut Client,
+        axis: AxisName,
+        travel: Travel,
+    ) -> Result<Self, ClientError> {
+        settings::refuse_edited(client)?;
+        let stage = settings::in_force(client)?;
+        let status = client.status()?;
+        if !status.is_at_rest() {
+            return Err(ClientError::Moving);
+        }
+        let origin_mm = status.axes[axis as usize].position_mm - travel.start_mm();
+        Ok(Self {
+            client,
+            axis,
+            stage,
+            travel,
+            origin_mm,
+            interrupted: None,
+        })
+    }
+
+    fn run(
+        &mut self,
+        experiment: &Experiment,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Recording, Stop> {
+        let here = self.enabled()?;
+        let motion = match experiment.drive {
+            Drive::ClosedLoop(motion) => Some(motion),
+            Drive::OpenLoop => None,
+        };
+        let moves = motion.is_some_and(|motion| motion != MotionSettings::Hold);
+        let mut motions = [MotionSettings::Hold; 3];
+        motions[self.axis as usize] = motion.unwrap_or(MotionSettings::Hold);
+        self.client
+            .order(Body::SetPlan(Translated::translated(PlanSettings {
+                motions,
+            })))?;
+        let channels = [
+            AxisSignal::Reference,
+            AxisSignal::Position,
+            AxisSignal::CodeSum,
+        ]
+        .map(|signal| Channel::Axis(Translated::translated(self.axis), signal));
+        let rate_hz = self.client.identity().rate_hz;
+        let requested = u16::try_from(experiment.decimation).unwrap_or(u16::MAX);
+        let least = requested.max(least_decimation(channels.len(), rate_hz));
+        let every = if experiment.injection_v.is_empty() {
+            least
+        } else {
+            dividing(least, rate_hz)
+        };
+        let injects = motion.is_none() || experiment.injection_v.iter().any(|volts| *volts != 0.0);
+
+        let mut telemetry = TelemetryRecorder::start(self.client, &channels, every)?;
+        let followed = self.follow(experiment, &mut telemetry, here, [injects, moves], progress);
+        let samples = telemetry.finish(self.client);
+        let lasts = experiment.injection_v.len();
+        let injected = match followed {
+            Ok(injected) => injected,
+            Err(stop) => {
+                let shape = Shape {
+                    settings: self.settings(),
+                    origin_mm: self.origin_mm,
+                    lasts: 0,
+                    moves: false,
+                    injected: None,
+                };
+                self.interrupted = samples.ok().and_then(|samples| shape.recording(&samples));
+                return Err(stop);
+            }
+        };
+        let samples = samples?;
+        progress(1.0);
+        if samples.lost() > 0 {
+            return Err(Stop::Lost(samples.lost()));
+        }
+        let shape = Shape {
+            settings: self.settings(),
+            origin_mm: self.origin_mm,
+            lasts,
+            moves,
+            injected: injected.as_ref(),
+        };
+        shape.recording(&samples).ok_or(Stop::Short)
+    }
+
+    /// Runs an experiment on the enabled axis, which stands at `here_mm`, and waits for its end.
+    fn follow(
+        &mut self,
+        experiment: &Experiment,
+        telemetry: &mut TelemetryRecorder,
+        here_mm: f64,
+        [injects, moves]: [bool; 2],
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Option<Injected>, Stop> {
+        let began = self.client.now();
+        let rate_hz = self.client.identity().rate_hz;
+        let mut injection = None;
+        if injects {
+            let room_mm = match experiment.drive {
+                Drive::OpenLoop => {
+                    let (low_mm, high_mm) = open_loop_mm(self.travel.half_mm(), here_mm);
+                    (here_mm - low_mm).min(high_mm - here_mm)
+                }
+                Drive::ClosedLoop(motion) => room_mm(self.travel.half_mm(), here_mm, &motion),
+            };
+            let mut plan = Injection::new(
+                experiment,
+                self.settings(),
+                Translated::translated(self.axis),
+                room_mm,
+                moves,
+            );
+            plan.send(self.client, telemetry)?;
+            injection = Some(plan);
+        } else if moves {
+            self.client.order(Body::Run)?;
+        }
+        let lasts = experiment.injection_v.len();
+        let least = Duration::from_secs_f64(lasts as f64 / rate_hz);
+        loop {
+            telemetry.gather(self.client, LOOK)?;
+            let elapsed = self.client.now().saturating_sub(began);
+            progress((elapsed.as_secs_f64() / experiment.time_limit_s).min(1.0));
+            let status = self.client.status()?;
+            self.client.refuse_fault("the experiment", &status)?;
+            // Axes that brake for a fault have it latched when they stand.
+            let ends = !status.running && status.state != MachineState::Stopping;
+            if elapsed >= least && ends {
+                break;
+            }
+            if elapsed.as_secs_f64() > experiment.time_limit_s {
+                self.client.order(Body::Stop)?;
+                return Err(Stop::TimedOut);
+            }
+        }
+        let tail = TAIL.max(Duration::from_secs_f64(TAIL_TICKS / rate_hz));
+        telemetry.gather(self.client, tail)?;
+        match injection {
+            Some(injection) => Ok(Some(injection.finish(self.client)?)),
+            None => Ok(None),
+        }
+    }
+
+    /// Resets a fault that the limits of an experiment are for, once the axis has come to rest: the next experiment may go on.
+    fn reset(&mut self, error: &ExperimentError) {
+        let ExperimentError::Fault { fault, .. } = error else {
+            return;
+        };
+        if ENDS_EXPERIMENTS.contains(&fault.code) {
+            // Where it cannot be reset, the next experiment says so.
+            let _ = self.client.wait(COASTING);
+            let _ = self.client.order(Body::ResetFault);
+        }
+    }
+
+    /// Waits for rest and switches the outputs off, if settings are to change on which safety depends.
+    fn disabled_for(&mut self, stage: &StageSettings) -> Result<(), settings::ExchangeError> {
+        if stage.safety_change(&self.stage).is_none() {
+            return Ok(());
+        }
+        let status = settle::rest(self.client, BEFORE)?;
+        if status.state == MachineState::Enabled {
+            self.client.order(Body::Disable)?;
+            let due = self.client.now() + ENABLING;
+            while self.client.status()?.state == MachineState::Enabled && self.client.now() < due {}
+        }
+        Ok(())
+    }
+
+    /// Waits for rest, with the outputs on; says where the axis is.
+    fn enabled(&mut self) -> Result<f64, ClientError> {
+        let mut status = settle::rest(self.client, BEFORE)?;
+        if status.state != MachineState::Enabled {
+            self.client.order(Body::Enable)?;
+            let due = self.client.now() + ENABLING;
+            while status.state != MachineState::Enabled && self.client.now() < due {
+                status = self.client.status()?;
+            }
+        }
+        Ok(status.axes[self.axis as usize].position_mm - self.origin_mm)
+    }
+}
+
+impl TestAxis for ConnectedAxis<'_> {
+    fn info(&self) -> AxisInfo {
+        let settings = self.settings();
+        AxisInfo {
+            name: self.axis.as_str(),
+            rate_hz: self.client.identity().rate_hz,
+            resolution_mm: settings.encoder.resolution_mm,
+            full_scale_v: settings.amplifier.full_scale_v,
+            travel_mm: self.travel.half_mm(),
+            start_mm: self.travel.start_mm(),
+            max_velocity_mm_s: settings.limits.max_velocity_mm_s,
+        }
+    }
+
+    fn settings(&self) -> &AxisSettings {
+        &self.stage.axes[self.axis as usize]
+    }
+
+    /// Checks the settings here and loads them into the machine.
+    fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
+        let mut stage = self.stage.clone();
+        stage.axes[self.axis as usize] = settings.clone();
+        stage.validate(quadrant_law::friction::gms::FIRMWARE_ELEMENTS)?;
+        self.disabled_for(&stage)
+            .and_then(|()| settings::load(self.client, &stage))
+            .map_err(|error| MachineError::Connection(Box::new(error)))?;
+        self.stage = stage;
+        Ok(())
+    }
+
+    fn perform(
+        &mut self,
+        experiment: &Experiment,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Recording, ExperimentError> {
+        self.interrupted = None;
+        self.run(experiment, progress).map_err(|stop| {
+            let error = stop.into_error(experiment);
+            self.reset(&error);
+            error
+        })
+    }
+
+    fn interrupted(&self) -> Option<&Recording> {
+        self.interrupted.as_ref()
+    }
+}
+
+/// Part of a second of which the samples of an injection make a whole number: the usual period of an excitation, s.
+const WHOLE_S: f64 = 0.25;
+
+/// The fewest control ticks between samples, `least` or up to twice as many, of which a whole number make [`WHOLE_S`]; `least` where there
+/// are none.
+fn dividing(least: u16, rate_hz: f64) -> u16 {
+    let whole = (WHOLE_S * rate_hz).round() as u32;
+    (least..=least.saturating_mul(2))
+        .find(|every| whole.is_multiple_of(u32::from(*every)))
+        .unwrap_or(least)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::dividing;
+
+    #[test]
+    fn samples_of_an_injection_make_a_whole_period_of_the_usual_excitation() {
+        for (least, rate_hz, every) in [
+            (1, 2e3, 1),
+            (2, 1e4, 2),
+            (3, 2e4, 4),
+            (3, 1e4, 4),
+            (7, 4e4, 8),
+            // No number from 3 to 6 divides it.
+            (3, 4.0 * 2503.0, 3),
+        ] {
+            assert_eq!(dividing(least, rate_hz), every, "{least} at {rate_hz} Hz");
+        }
+    }
+}

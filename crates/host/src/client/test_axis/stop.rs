@@ -1,0 +1,79 @@
+//! End of an experiment on a connected axis: put out in full, or stopped.
+
+use quadrant::link::message::InjectStatus;
+use quadrant_law::safety::{Fault, FaultCode};
+use quadrant_tune::test_axis::{Experiment, ExperimentError};
+
+use crate::client::error::ClientError;
+
+/// An injection that was put out: the tick of its first value, and all values, V.
+pub(super) struct Injected {
+    pub(super) first_tick: u32,
+    pub(super) values_v: Vec<f64>,
+}
+
+/// Reason why an experiment ended early.
+pub(super) enum Stop {
+    Client(Box<ClientError>),
+    TimedOut,
+    Lost(u64),
+    /// The injection was broken off.
+    Broken(InjectStatus),
+    /// The recording does not hold the experiment.
+    Short,
+}
+
+impl From<ClientError> for Stop {
+    fn from(error: ClientError) -> Self {
+        Self::Client(Box::new(error))
+    }
+}
+
+impl Stop {
+    pub(super) fn into_error(self, experiment: &Experiment) -> ExperimentError {
+        let name = experiment.name.clone();
+        let reason = match self {
+            Self::TimedOut => {
+                return ExperimentError::TimedOut {
+                    experiment: name,
+                    time_limit_s: experiment.time_limit_s,
+                    reason: "the motion has not ended",
+                };
+            }
+            Self::Client(error) => match *error {
+                ClientError::Fault {
+                    code, axis, tick, ..
+                } if FaultCode::from_number(code).is_some() => {
+                    let code = FaultCode::from_number(code).unwrap_or(FaultCode::FollowingError);
+                    let fault = Fault { code, axis, tick };
+                    return ExperimentError::Fault {
+                        experiment: name,
+                        fault,
+                    };
+                }
+                ClientError::Interrupted { done } => {
+                    return ExperimentError::Interrupted {
+                        experiment: name,
+                        done,
+                    };
+                }
+                other => other.to_string(),
+            },
+            Self::Lost(lost) => format!(
+                "{lost} samples were lost on the line; use a faster one, or a coarser sampling"
+            ),
+            Self::Broken(status) => format!(
+                "the injected voltage ended after {} of {} values: somebody stopped the axes, or the machine held them; look \
+                 at `log`",
+                status.done, status.next_sequence
+            ),
+            Self::Short => {
+                "the recording does not hold it; the line lost its beginning or its end".to_owned()
+            }
+        };
+        ExperimentError::Impossible {
+            experiment: name,
+            reason,
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! The firmware's application in this process, between two starts: control interrupt, supervising task and server, one
+//! after the other in the order in which the target runs them.
+
+use std::collections::VecDeque;
+
+use quadrant::app::Translated;
+use quadrant::app::{
+    Axis, Control, Inputs, Intake, Poll, Queues, Server, ServerParts, Snapshot, Supervision,
+    TimingStatistics,
+};
+use quadrant::hal::Serial;
+use quadrant::link::message::NumberType;
+use quadrant::store::{BUFFER_BYTES, LoadError, Loaded, Store};
+use quadrant_law::command::Command;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::safety::FaultCode;
+use quadrant_law::scalar::Scalar;
+use quadrant_law::stage::{Outputs, StageState};
+use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
+use quadrant_sim::law_machine::TickInput;
+
+use super::memory_flash::MemoryFlash;
+
+/// Words of the capture, as on the reference board.
+const CAPTURE_WORDS: usize = quadrant::app::capture::CAPTURE_WORDS;
+/// Control rates of the simulated machine, Hz: all that settings allow.
+const RATES_HZ: (f64, f64) = (1e3, 1e5);
+/// Requests of the operator at the machine that may wait, as in the firmware.
+const REQUESTS: usize = 3;
+
+/// The application, as it runs between two starts.
+pub struct Running<S: Scalar> {
+    control: Control<'static, 'static, S>,
+    intake: Intake<'static>,
+    supervision: Supervision,
+    server: Server<'static, 'static, S, MemoryFlash>,
+    seen: Snapshot<S>,
+    /// Requests of the operator at the machine.
+    requests: VecDeque<Command>,
+    /// Commands of the supervising task: urgent ones, and those of the operator that it let through.
+    commands: VecDeque<Command>,
+}
+
+/// Start conditions of the application.
+#[derive(Clone, Copy, Debug)]
+pub struct Start<'a> {
+    /// The settings of a machine whose flash is empty.
+    pub defaults: &'a StageSettings,
+    /// Motions that `run` starts.
+    pub plan: &'a PlanSettings,
+    /// Fault that the run before has left.
+    pub fault: Option<FaultCode>,
+    /// Name, timer and number type for the greeting.
+    pub identity: BoardIdentity,
+}
+
+/// Name, timer and number type of a machine, for the greeting.
+#[derive(Clone, Copy, Debug)]
+pub struct BoardIdentity {
+    /// Name of the board.
+    pub board: &'static str,
+    /// Rate of the timer that measures ticks, Hz; zero if there is none.
+    pub cycle_hz: u32,
+    /// Number type of the control law.
+    pub number: NumberType,
+}
+
+impl<S: Scalar> Running<S> {
+    /// As the firmware does after a reset.
+    ///
+    /// # Errors
+    /// The first of the settings for an empty flash that is refused.
+    pub fn start(start: Start<'_>, flash: MemoryFlash) -> Result<Self, SettingsError> {
+        let Start { defaults, .. } = start;
+        let (mut invalid, mut keep_draft) = (None, false);
+        let mut store = Store::new(flash, 0);
+        let buffer: &'static mut [u8; BUFFER_BYTES] = Box::leak(Box::new([0; BUFFER_BYTES]));
+        let settings: &'static mut StageSettings = Box::leak(Box::new(defaults.clone()));
+        let draft: &'static mut StageSettings = Box::leak(Box::new(defaults.clone()));
+        let loaded = store.load(settings, FIRMWARE_ELEMENTS, buffer, &mut |_| {});
+        let provenance = match loaded {
+            Ok(Some(Loaded {
+                provenance,
+                is_newest: true,
+                ..
+            })) => provenance,
+            Ok(Some(older)) => {
+                draft.copy_from(settings);
+                settings.copy_from(defaults);
+                (invalid, keep_draft) = (Some(FaultCode::SettingsInvalid), true);
+                older.provenance
+            }
+            Ok(None) => {
+                settings.copy_from(defaults);
+                Default::default()
+            }
+            Err(LoadError::Decode(_) | LoadError::Log(_)) => {
+                settings.copy_from(defaults);
+                invalid = Some(FaultCode::SettingsInvalid);
+                Default::default()
+            }
+        };
+        let resolution_mm = settings
+            .axes
+            .each_ref()
+            .map(|axis| axis.encoder.resolution_mm);
+        let stage = settings.build::<S, FIRMWARE_ELEMENTS>()?;
+        let plan = start.plan.build(settings)?;
+        let (axes, operation) = stage.into_axes();
+        // What the tasks share lives as long as the firmware does, and so it is here: a few tens of KB for each start.
+        let back_buffer: &'static mut Axis<S> = Box::leak(Box::new(axes[0].clone()));
+        let axes = axes.map(|axis| -> &'static mut Axis<S> { Box::leak(Box::new(axis)) });
+        let queues: &'static mut Queues<'static, S> = Box::leak(Box::new(Queues::new()));
+        let (control_ends, intake_ends, ends) = queues.split();
+        let rate_hz = settings.rate_hz as u32;
+        let mut control = Control::new(axes, operation, plan, rate_hz, control_ends);
+        for code in [start.fault, invalid].into_iter().flatten() {
+            control.start_faulted(code);
+        }
+        let identity = start.identity;
+        Ok(Self {
+            control,
+            intake: Intake::new(intake_ends),
+            supervision: Supervision::new(resolution_mm),
+            server: Server::new(ServerParts {
+                ends,
+                back_buffer,
+                settings,
+                draft,
+                keep_draft,
+                provenance,
+                store,
+                buffer,
+                capture: Box::leak(vec![0; CAPTURE_WORDS].into_boxed_slice()),
+                board: identity.board,
+                cycle_hz: identity.cycle_hz,
+                rates_hz: RATES_HZ,
+                number: identity.number,
+            }),
+            seen: Snapshot::default(),
+            requests: VecDeque::new(),
+            commands: VecDeque::new(),
+        })
+    }
+
+    /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.
+    pub fn tick(&mut self, inputs: &TickInput, serial: &mut impl Serial) -> (Outputs, Poll) {
+        self.control.note_requests(self.intake.frames());
+        let outputs = self.control.tick(&mut Inputs {
+            command: self.commands.pop_front(),
+            ..inputs.inputs()
+        });
+        self.server.flash().set_outputs_off(!outputs.enabled);
+        if self.requests.len() < REQUESTS {
+            self.requests.extend(inputs.request);
+        }
+        if !self.control.observe(0) {
+            return (outputs, Poll::Continue);
+        }
+        let seen = self.control.snapshot();
+        self.seen = seen;
+        let received = self.intake.run(serial);
+        if let Some(urgent) = received.urgent {
+            let command = Intake::overtake(urgent, self.requests.drain(..));
+            self.commands.push_back(command);
+        }
+        let supervised = self.supervision.run(&seen, self.requests.pop_front());
+        if let Some(command) = supervised.command {
+            self.intake.note(command);
+            self.commands.push_back(command);
+        }
+        self.control
+            .show_glitches(self.supervision.glitch_readings());
+        for event in supervised.events {
+            self.server
+                .push_event(seen.tick, Translated::translated(event));
+        }
+        let after = self
+            .server
+            .poll(serial, &self.seen, TimingStatistics::default());
+        (outputs, after)
+    }
+
+    /// The flash that settings are stored in.
+    pub fn flash(&self) -> &MemoryFlash {
+        self.server.flash()
+    }
+
+    /// The control law's memory.
+    pub fn state(&self) -> &StageState<S, FIRMWARE_ELEMENTS> {
+        self.control.state()
+    }
+}

@@ -1,0 +1,100 @@
+//! The simulated machine as the other end of a link.
+
+use std::io;
+use std::path::Path;
+use std::time::Duration;
+
+use quadrant::lockstep::FLASH_BYTES;
+use quadrant_law::safety::Switches;
+use quadrant_law::supervisor::PERIOD_TICKS;
+use quadrant_sim::stage_setup::StageSetup;
+
+use super::flash_file::FlashFile;
+use super::loopback::{Loopback, SimulatedPeer};
+use super::memory_flash::MemoryFlash;
+use super::simulated::SimulatedMachine;
+use super::simulated_io::SimulatedIo;
+use super::timing::server_period;
+
+/// The firmware's application on a simulated stage, and the bytes to and from it.
+pub struct SimulatedLink {
+    machine: SimulatedMachine,
+    flash: Option<FlashFile>,
+    period: Duration,
+}
+
+impl SimulatedLink {
+    /// A machine that has just been switched on; `seed` decides the noise of its encoders, and a file keeps its flash.
+    ///
+    /// # Errors
+    /// Defaults that are refused, or a file that is no flash.
+    pub fn start(
+        setup: &StageSetup,
+        seed: u64,
+        flash: Option<&Path>,
+    ) -> io::Result<Loopback<Self>> {
+        let StageSetup {
+            settings,
+            truth,
+            marks,
+        } = setup;
+        let flash = flash
+            .map(|path| FlashFile::open(path, FLASH_BYTES))
+            .transpose()?;
+        let content = flash
+            .as_ref()
+            .and_then(|file| MemoryFlash::of(file.content().to_vec()))
+            .unwrap_or_default();
+        let mut machine = SimulatedMachine::with_flash(settings, truth, seed, content)
+            .map_err(io::Error::other)?;
+        machine.plant_mut().set_marks(*marks);
+        Ok(Loopback::new(Self {
+            machine,
+            flash,
+            period: server_period(settings),
+        }))
+    }
+}
+
+impl SimulatedPeer for SimulatedLink {
+    fn exchange(&mut self, sent: &[u8]) -> io::Result<Vec<u8>> {
+        self.machine.send(sent);
+        self.machine.run(PERIOD_TICKS);
+        // An answer of the emulated board is seen a tick late. SimulatedIo are to act in the same tick on both.
+        while self.machine.tick() % PERIOD_TICKS != 1 {
+            self.machine.run(1);
+        }
+        if let Some(file) = &mut self.flash {
+            file.keep(self.machine.flash().bytes())?;
+        }
+        Ok(self.machine.receive())
+    }
+
+    fn period(&self) -> Duration {
+        self.period
+    }
+
+    fn simulated_io(&mut self) -> Option<&mut dyn SimulatedIo> {
+        Some(self)
+    }
+}
+
+impl SimulatedIo for SimulatedLink {
+    fn press(&mut self, switches: Switches) {
+        self.machine.press(switches);
+    }
+
+    fn power_cycle(&mut self) -> io::Result<()> {
+        self.machine.power_cycle();
+        Ok(())
+    }
+
+    fn been_mm(&self) -> Option<[(f64, f64); 3]> {
+        Some(self.machine.been_mm())
+    }
+
+    /// The library's code logs nothing: that is the firmware's business.
+    fn log(&mut self) -> io::Result<Option<Vec<String>>> {
+        Ok(None)
+    }
+}

@@ -1,0 +1,265 @@
+//! The chain: motor constant, response, plant, PID, friction, pre-sliding, revised model, N-PID, verdict.
+
+use quadrant_settings::AxisSettings;
+
+use super::bootstrap::{low_bandwidth_settings_on, measuring_settings, zero_gain_settings};
+use super::commissioned::{CommissionSettings, Commissioned};
+use super::error::CommissionError;
+use super::guard::Guard;
+use super::linear_model::{HOME_MM, Linear, linear_model};
+use super::models::{self, Measurements, Models};
+use super::quiet_pid;
+use super::verify::verify;
+use crate::identify::motor_constant::{self, MotorConstantSettings};
+use crate::identify::static_friction::{
+    self, FrictionFit, FrictionFitError, FrictionMap, StaticFrictionError, StaticFrictionSettings,
+};
+use crate::identify::virgin_curve::{self, GmsFit, VirginCurveError, VirginCurveSettings};
+use crate::record::Recording;
+use crate::test_axis::{TestAxis, approach};
+
+/// The steps, for progress: name and share of the whole.
+const STEPS: [(&str, f64); 6] = [
+    ("motor constant", 0.01),
+    ("frequency response", 0.06),
+    ("friction at constant velocity", 0.63),
+    ("pre-sliding friction", 0.15),
+    ("controller", 0.01),
+    ("verdict", 0.14),
+];
+
+/// Commissions an axis, unattended. Of `base` encoder, amplifier, limits and derivative filter count, not the gains and the
+/// friction. `progress` receives the step and the share of the whole.
+///
+/// # Errors
+/// The first step that fails, with the reason and a remedy; the axis is left at rest, its outputs off.
+pub fn commission(
+    test_axis: &mut dyn TestAxis,
+    base: &AxisSettings,
+    request: &CommissionSettings,
+    progress: &mut dyn FnMut(&'static str, f64),
+) -> Result<Commissioned, CommissionError> {
+    let mut guard = Guard::new(test_axis);
+    match guarded(&mut guard, base, request, progress) {
+        Ok(found) => Ok(Commissioned {
+            ran: guard.runs,
+            ..found
+        }),
+        Err(error) => Err(match guard.ringing() {
+            Some(ringing)
+                if !matches!(error, CommissionError::Rings { .. }) && !error.is_interrupted() =>
+            {
+                CommissionError::rings(ringing, error)
+            }
+            _ => error,
+        }),
+    }
+}
+
+fn guarded(
+    test_axis: &mut Guard<'_>,
+    base: &AxisSettings,
+    request: &CommissionSettings,
+    progress: &mut dyn FnMut(&'static str, f64),
+) -> Result<Commissioned, CommissionError> {
+    let rate_hz = test_axis.info().rate_hz;
+    let mut step = 0;
+    let mut report = |step: usize, share: f64| {
+        let before: f64 = STEPS[..step].iter().map(|(_, part)| part).sum();
+        progress(STEPS[step].0, before + share * STEPS[step].1);
+    };
+
+    test_axis.apply(&zero_gain_settings(base))?;
+    let steps = MotorConstantSettings::default().fitted_to(test_axis.info().first_room_mm());
+    let motor = motor_constant::measure(test_axis, &steps, &mut |share| {
+        report(step, share);
+    })?;
+
+    step += 1;
+    let Linear {
+        motor,
+        response,
+        plant,
+        mut controller,
+    } = linear_model(test_axis, base, request, &steps, motor, &mut |share| {
+        report(step, share);
+    })?;
+
+    step += 1;
+    let mut settings = base.clone();
+    settings.plant = Some(plant.plant);
+    settings.friction = models::rough_friction(motor.directed_v, &plant.plant, rate_hz);
+    let runs = request.friction.fitted_to(&test_axis.info());
+    let mut tried = false;
+    let (map, recordings, friction) = loop {
+        controller.put_into(&mut settings);
+        test_axis.apply(&measuring_settings(&settings))?;
+        let (map, recordings, found) = friction(test_axis, runs, &mut |share| {
+            report(step, share);
+        })?;
+        let uneven = map.runs.iter().filter(|run| run.stick_slip).count();
+        let is_even = found.is_ok() && (uneven as f64) < MAX_UNEVEN_SHARE * map.runs.len() as f64;
+        if tried || is_even || !quiet_pid::soften(test_axis, &settings, &mut controller)? {
+            break (map, recordings, found?);
+        }
+        tried = true;
+    };
+
+    step += 1;
+    let process = models::process(&plant, &controller.filters);
+    let quiet = low_bandwidth_settings_on(&settings, &plant.plant, &process, rate_hz);
+    let moving = runs.two_sided.then(|| measuring_settings(&settings));
+    let (recording, gms) = presliding(test_axis, &friction, &quiet, moving, &mut |share| {
+        report(step, share);
+    })?;
+
+    step += 1;
+    let measurements = Measurements {
+        motor,
+        response,
+        map,
+        runs: recordings,
+        presliding: recording,
+    };
+    let models = Models {
+        plant,
+        controller,
+        friction,
+        gms,
+    };
+    let mut found = models.commissioned(measurements, base, request, rate_hz);
+
+    if !request.trials {
+        return Ok(found);
+    }
+    step += 1;
+    let mut softenings = 0;
+    let verification = loop {
+        match verify(test_axis, &found.settings, &mut |share| report(step, share)) {
+            Err(error) if error.asks_for_softer() && softenings < models::MAX_SOFTENINGS => {
+                softenings += 1;
+                found.soften(&error, rate_hz);
+            }
+            outcome => break outcome?,
+        }
+    };
+    found.settings = verification.settings(&found.settings);
+    found.verification = Some(verification);
+    Ok(found)
+}
+
+/// Share of uneven runs from which on the PID is checked for oscillation: of the simulated stage's axes 1/8 are uneven.
+const MAX_UNEVEN_SHARE: f64 = 0.2;
+
+/// Voltages at constant velocities, the recordings of the runs, and the model of them.
+type Friction = (
+    FrictionMap,
+    Vec<Recording>,
+    Result<FrictionFit, CommissionError>,
+);
+
+/// Friction at constant velocities, at faster ones as long as the axis sticks and slips at the slowest, or breaks away under vibration; and
+/// its model.
+fn friction(
+    test_axis: &mut dyn TestAxis,
+    mut runs: StaticFrictionSettings,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Friction, CommissionError> {
+    loop {
+        let start_mm = runs.start_mm(test_axis.info().travel_mm);
+        approach(test_axis, start_mm).map_err(StaticFrictionError::from)?;
+        let (map, recordings) = static_friction::measure(test_axis, &runs, progress)?;
+        let (slowest, fastest) = &mut runs.velocities_mm_s;
+        match models::even_friction(&map) {
+            Err(FrictionFitError::TooFewRuns { .. } | FrictionFitError::Sign { .. })
+                if SLOWEST_VELOCITY_RAISE * *slowest < *fastest / SLOWEST_VELOCITY_RAISE =>
+            {
+                *slowest *= SLOWEST_VELOCITY_RAISE;
+            }
+            _ => {
+                let found = models::friction(&map);
+                return Ok((map, recordings, found));
+            }
+        }
+    }
+}
+
+/// The hysteresis before sliding, and the elements from it. On an axis that breaks away under noise or vibration, a slow motion meets
+/// less friction than it will in use: quicker sines are tried until one meets what sliding did, and the one that meets most counts.
+/// The sines run under `quiet`, from the middle of the travel, to which the axis goes under `moving`; from where it stands without.
+fn presliding(
+    test_axis: &mut dyn TestAxis,
+    friction: &FrictionFit,
+    quiet: &AxisSettings,
+    moving: Option<AxisSettings>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(Recording, Result<GmsFit, VirginCurveError>), CommissionError> {
+    let (coulomb_v, breakaway_v) = friction.mean_levels_v();
+    let usual = VirginCurveSettings::outrunning(quiet.feedback.pid.kp_v_per_mm, breakaway_v);
+    let mut sine = VirginCurveSettings {
+        amplitude_mm: usual
+            .amplitude_mm
+            .min(SINE_SHARE * test_axis.info().travel_mm),
+        ..usual
+    };
+    let measure = |test_axis: &mut dyn TestAxis,
+                   sine: &VirginCurveSettings,
+                   progress: &mut dyn FnMut(f64)| {
+        if let Some(moving) = &moving {
+            test_axis.apply(moving)?;
+            approach(test_axis, HOME_MM)?;
+        }
+        test_axis.apply(quiet)?;
+        let recording = virgin_curve::measure(test_axis, sine, progress)?;
+        let gms = models::presliding(&recording, friction);
+        Ok::<_, CommissionError>((recording, gms))
+    };
+    type Found = (Recording, Result<GmsFit, VirginCurveError>);
+    let met = |(_, gms): &Found| {
+        let sliding_v = breakaway_v.min(coulomb_v);
+        gms.as_ref()
+            .map_or(0.0, |found| found.curve.top_v() / sliding_v)
+    };
+    let will_do = |found: &Found| {
+        let fits = |gms: &GmsFit| gms.prediction.relative_error < POOR_FIT;
+        met(found) >= MIN_MET_SHARE && found.1.as_ref().is_ok_and(fits)
+    };
+    let mut best = measure(test_axis, &sine, progress)?;
+    let most_mm = LARGEST_SINE_SHARE * test_axis.info().travel_mm;
+    for _ in 0..MAX_FURTHER_SINES {
+        if will_do(&best) {
+            break;
+        }
+        let still_rises = matches!(best.1, Err(VirginCurveError::NoPlateau { .. }));
+        if still_rises && sine.amplitude_mm < most_mm {
+            sine.amplitude_mm = (FURTHER_AMPLITUDE_RATIO * sine.amplitude_mm).min(most_mm);
+        } else {
+            sine.frequency_hz *= FURTHER_VELOCITY_RATIO;
+        }
+        match measure(test_axis, &sine, &mut |_| {}) {
+            Ok(found) if met(&found) > met(&best) => best = found,
+            Ok(_) => {}
+            // What was measured is kept.
+            Err(CommissionError::Sine(error)) if error.strayed() => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(best)
+}
+
+/// Least friction that a slow sine meets over the least level of sliding: with less, the axis breaks away under vibration.
+const MIN_MET_SHARE: f64 = 0.8;
+/// Error of the elements' prediction from which on the fit is poor.
+const POOR_FIT: f64 = 0.2;
+/// Further sines that are tried.
+const MAX_FURTHER_SINES: usize = 2;
+/// Factor on the velocity of each further sine.
+const FURTHER_VELOCITY_RATIO: f64 = 4.0;
+/// Factor on the amplitude of each further sine, while the friction still rises.
+const FURTHER_AMPLITUDE_RATIO: f64 = 2.5;
+/// Largest amplitude of a further sine over the travel.
+pub(super) const LARGEST_SINE_SHARE: f64 = 0.25;
+/// Share of the travel that the slow sine takes at most at first.
+const SINE_SHARE: f64 = 0.1;
+/// Factor by which the slowest velocity is raised where the axis sticks and slips.
+const SLOWEST_VELOCITY_RAISE: f64 = 3.0;

@@ -1,0 +1,327 @@
+//! The experiment: moves at constant velocity over the same stretch, both ways.
+
+use quadrant_law::reference::{MotionSettings, PointToPointSettings};
+
+use super::map::{FrictionMap, FrictionRun};
+use crate::identify::setting::SettingError;
+use crate::record::Recording;
+use crate::test_axis::{
+    AxisInfo, Drive, Experiment, ExperimentError, Sides, TestAxis, approach_from,
+};
+
+/// Parameters of the measurement of the friction-velocity map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StaticFrictionSettings {
+    /// Slowest and fastest velocity, mm/s.
+    pub velocities_mm_s: (f64, f64),
+    /// Number of velocities, even on a log scale.
+    pub count: usize,
+    /// Length over which the voltage is averaged, mm: a whole number of turns of the screw, whose ripple then cancels.
+    pub stretch_mm: f64,
+    /// Time after which a run's beginning is over, s: the slowest mode of the loop has died away.
+    pub settling_s: f64,
+    /// Runs go through both sides of the travel: the axis stands at its negative end.
+    pub two_sided: bool,
+}
+
+impl Default for StaticFrictionSettings {
+    fn default() -> Self {
+        Self {
+            velocities_mm_s: (0.05, 40.0),
+            count: 16,
+            stretch_mm: 10.0,
+            settling_s: 2.5,
+            two_sided: false,
+        }
+    }
+}
+
+/// Reasons for which no map was measured.
+#[derive(Debug, thiserror::Error)]
+pub enum StaticFrictionError {
+    /// A setting that cannot be.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// A run does not fit into the travel.
+    #[error(
+        "a run at {velocity_mm_s:.2} mm/s needs {needed_mm:.0} mm, and there are {travel_mm:.0} mm: lower the fastest velocity, the \
+         stretch or the settling time"
+    )]
+    Travel {
+        velocity_mm_s: f64,
+        /// Travel that a run takes, mm.
+        needed_mm: f64,
+        travel_mm: f64,
+    },
+    /// A run was stopped.
+    #[error(transparent)]
+    Experiment(#[from] ExperimentError),
+}
+
+/// Acceleration of the moves, mm/s^2.
+const ACCELERATION_MM_S2: f64 = 500.0;
+/// Jerk of the moves, mm/s^3.
+const JERK_MM_S3: f64 = 2e4;
+/// Length of the stretch over a short travel.
+const STRETCH_SHARE: f64 = 0.4;
+/// Settling time on a short travel, s.
+const SHORT_SETTLING_S: f64 = 0.6;
+/// Travel either way below which both sides are used, mm.
+const SHORT_MM: f64 = 60.0;
+/// Share of the largest velocity that a run takes at most.
+const MOST_VELOCITY: f64 = 0.6;
+/// Samples of a run's recording at least: about one a count of the encoder at the slowest velocities.
+const SAMPLES: f64 = 20_000.0;
+/// Parts into which the stretch is cut to see its scatter.
+const PARTS: usize = 20;
+/// Counts of the encoder over which the velocity is looked at for stick-slip.
+const STICK_SLIP_COUNTS: f64 = 4.0;
+/// Velocity over the reference's below which an axis sticks.
+const MAX_STICK_RATIO: f64 = 0.3;
+/// Velocity over the reference's above which it slips.
+const MIN_SLIP_RATIO: f64 = 2.0;
+
+impl StaticFrictionSettings {
+    /// A shorter stretch, less settling and slower runs where travel or limits do not hold the fastest.
+    #[must_use]
+    pub fn fitted_to(mut self, axis: &AxisInfo) -> Self {
+        self.two_sided = axis.travel_mm < SHORT_MM;
+        let room_mm = self.room_mm(axis.travel_mm);
+        if self.stretch_mm > STRETCH_SHARE * room_mm {
+            self.stretch_mm = STRETCH_SHARE * room_mm;
+            self.settling_s = self.settling_s.min(SHORT_SETTLING_S);
+        }
+        let (slowest, fastest) = self.velocities_mm_s;
+        let mut fastest = fastest.min(MOST_VELOCITY * axis.max_velocity_mm_s);
+        while self.length_mm(fastest) > room_mm && fastest > 2.0 * slowest {
+            fastest *= 0.9;
+        }
+        self.velocities_mm_s = (slowest, fastest);
+        self
+    }
+
+    /// Length of a run at most, mm.
+    fn room_mm(&self, travel_mm: f64) -> f64 {
+        Sides::of(self.two_sided).room_mm(travel_mm)
+    }
+
+    /// Position at which the axis stands before the first run, mm.
+    pub fn start_mm(&self, travel_mm: f64) -> f64 {
+        Sides::of(self.two_sided).start_mm(travel_mm)
+    }
+
+    /// The longest run, mm, and the time that all take, s.
+    pub fn extent(&self) -> (f64, f64) {
+        let longest_mm = self.velocities().map(|velocity| self.length_mm(velocity));
+        (longest_mm.fold(0.0, f64::max), self.lasts_s())
+    }
+
+    /// The time of all runs, both ways, s.
+    fn lasts_s(&self) -> f64 {
+        let duration = |velocity: f64| 2.0 * self.length_mm(velocity) / velocity;
+        self.velocities().map(duration).sum()
+    }
+
+    fn check(&self) -> Result<(), StaticFrictionError> {
+        let (slowest, fastest) = self.velocities_mm_s;
+        let checks = [
+            (
+                "slowest velocity",
+                slowest,
+                slowest > 0.0,
+                "it must be above zero, in mm/s",
+            ),
+            (
+                "fastest velocity",
+                fastest,
+                fastest > slowest,
+                "it must be above the slowest",
+            ),
+            (
+                "velocities",
+                self.count as f64,
+                self.count >= 6,
+                "five parameters take at least 6",
+            ),
+            (
+                "stretch",
+                self.stretch_mm,
+                self.stretch_mm > 0.0,
+                "it must be above zero, in mm",
+            ),
+            (
+                "settling time",
+                self.settling_s,
+                self.settling_s >= 0.0,
+                "it must be zero or more, in s",
+            ),
+        ];
+        for (field, value, holds, expected) in checks {
+            if !(value.is_finite() && holds) {
+                return Err(SettingError {
+                    field,
+                    value,
+                    expected,
+                }
+                .into());
+            }
+        }
+        Ok(())
+    }
+
+    /// The velocities, slowest first.
+    fn velocities(&self) -> impl Iterator<Item = f64> + use<> {
+        let (slowest, fastest) = self.velocities_mm_s;
+        let last = (self.count - 1) as f64;
+        (0..self.count).map(move |index| slowest * (fastest / slowest).powf(index as f64 / last))
+    }
+
+    /// The length of a run, mm: up to speed, settling, the stretch, and down again.
+    fn length_mm(&self, velocity_mm_s: f64) -> f64 {
+        let ramp_s = velocity_mm_s / ACCELERATION_MM_S2 + ACCELERATION_MM_S2 / JERK_MM_S3;
+        self.stretch_mm + velocity_mm_s * (self.settling_s + 2.0 * ramp_s)
+    }
+}
+
+/// Measures the map on the axis under test, under the settings that are in force.
+///
+/// # Errors
+/// Settings that cannot be, too little travel, or a run that is stopped.
+pub fn measure(
+    test_axis: &mut dyn TestAxis,
+    settings: &StaticFrictionSettings,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(FrictionMap, Vec<Recording>), StaticFrictionError> {
+    settings.check()?;
+    let travel_mm = settings.room_mm(test_axis.info().travel_mm);
+    for velocity_mm_s in settings.velocities() {
+        let needed_mm = settings.length_mm(velocity_mm_s);
+        if needed_mm > travel_mm {
+            return Err(StaticFrictionError::Travel {
+                velocity_mm_s,
+                needed_mm,
+                travel_mm,
+            });
+        }
+    }
+    let all_s = settings.lasts_s();
+    let mut done_s = 0.0;
+    let mut map = FrictionMap::default();
+    let mut recordings: Vec<Recording> = Vec::new();
+    let start_mm = settings.start_mm(test_axis.info().travel_mm);
+    for velocity_mm_s in settings.velocities() {
+        let length_mm = settings.length_mm(velocity_mm_s);
+        for (direction, from_mm) in [(1.0, start_mm), (-1.0, start_mm + length_mm)] {
+            approach_from(test_axis, recordings.last(), from_mm)?;
+            let run_s = length_mm / velocity_mm_s;
+            let recording = test_axis.perform(
+                &Experiment {
+                    name: format!("friction at {:.3} mm/s", direction * velocity_mm_s),
+                    drive: Drive::ClosedLoop(MotionSettings::PointToPoint(PointToPointSettings {
+                        distance_mm: direction * length_mm,
+                        max_velocity_mm_s: velocity_mm_s,
+                        max_acceleration_mm_s2: ACCELERATION_MM_S2,
+                        max_jerk_mm_s3: JERK_MM_S3,
+                    })),
+                    injection_v: Vec::new(),
+                    decimation: ((run_s * test_axis.info().rate_hz / SAMPLES) as usize).max(1),
+                    time_limit_s: 10.0 + 1.5 * run_s,
+                },
+                &mut |share| progress((done_s + share * run_s) / all_s),
+            )?;
+            done_s += run_s;
+            map.runs.extend(evaluate(
+                &recording,
+                settings,
+                direction * velocity_mm_s,
+                test_axis.info().resolution_mm,
+            ));
+            recordings.push(recording);
+        }
+    }
+    map.runs
+        .sort_by(|a, b| a.velocity_mm_s.total_cmp(&b.velocity_mm_s));
+    map.mark_shaken();
+    Ok((map, recordings))
+}
+
+/// Evaluates a run at a velocity over the stretch, the last before it slows down.
+pub(super) fn evaluate(
+    recording: &Recording,
+    settings: &StaticFrictionSettings,
+    velocity_mm_s: f64,
+    resolution_mm: f64,
+) -> Option<FrictionRun> {
+    let direction = velocity_mm_s.signum();
+    let ramp_s = velocity_mm_s.abs() / ACCELERATION_MM_S2 + ACCELERATION_MM_S2 / JERK_MM_S3;
+    let end_mm = recording.reference_mm.last()? - 0.5 * velocity_mm_s * ramp_s;
+    let begin_mm = end_mm - direction * settings.stretch_mm;
+    let passed = |limit_mm: f64| {
+        recording
+            .reference_mm
+            .iter()
+            .position(|reference| direction * (reference - limit_mm) >= 0.0)
+    };
+    let stretch = passed(begin_mm)?..passed(end_mm)?;
+    let (positions, voltages) = (
+        &recording.position_mm[stretch.clone()],
+        &recording.voltage_v[stretch.clone()],
+    );
+    if voltages.len() < 2 * PARTS {
+        return None;
+    }
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let count = positions.len() as f64 - 1.0;
+    let measured =
+        (positions[positions.len() - 1] - positions[0]) / (count * recording.sample_time_s);
+    let voltage_v = mean(voltages);
+    // Parts opposite each other on the screw have opposite ripple: their mean scatters without it.
+    let parts: Vec<f64> = voltages
+        .chunks_exact(voltages.len() / PARTS)
+        .map(mean)
+        .collect();
+    let pairs: Vec<f64> = (0..PARTS / 2)
+        .map(|index| 0.5 * (parts[index] + parts[index + PARTS / 2]))
+        .collect();
+    let variance = pairs
+        .iter()
+        .map(|pair| (pair - mean(&pairs)).powi(2))
+        .sum::<f64>()
+        / (pairs.len() - 1) as f64;
+    let stick_slip = sticks_and_slips(
+        positions,
+        velocity_mm_s,
+        recording.sample_time_s,
+        resolution_mm,
+    );
+    Some(FrictionRun {
+        velocity_mm_s: measured,
+        voltage_v,
+        deviation_v: (variance / pairs.len() as f64)
+            .sqrt()
+            .max(LEAST_DEVIATION_V),
+        stick_slip,
+    })
+}
+
+/// True if the velocity over a few counts falls to a share of its mean somewhere, and rises to a multiple elsewhere.
+fn sticks_and_slips(
+    positions: &[f64],
+    velocity_mm_s: f64,
+    sample_time_s: f64,
+    resolution_mm: f64,
+) -> bool {
+    let sample_mm = velocity_mm_s * sample_time_s;
+    let span = ((STICK_SLIP_COUNTS * resolution_mm / sample_mm.abs()).ceil() as usize).max(1);
+    let shares = positions
+        .windows(span + 1)
+        .map(|window| (window[span] - window[0]) / (span as f64 * sample_mm));
+    let (least, most) = shares.fold(
+        (f64::INFINITY, f64::NEG_INFINITY),
+        |(least, most), share| (share.min(least), share.max(most)),
+    );
+    least < MAX_STICK_RATIO && most > MIN_SLIP_RATIO
+}
+
+/// A scatter below which a mean is not believed to be, V.
+const LEAST_DEVIATION_V: f64 = 1e-6;

@@ -1,0 +1,235 @@
+//! The friction-velocity map and its model, judged against the truth of the simulated stage.
+
+use quadrant_law::friction::PerDirection;
+use quadrant_sim::plant::{AxisParameters, StageParameters};
+use quadrant_tune::commission::bootstrap::measuring_settings;
+use quadrant_tune::identify::static_friction::{
+    Exponent, FrictionFitError, FrictionMap, FrictionRun, StaticFrictionError,
+    StaticFrictionSettings, fit_map, measure,
+};
+use quadrant_tune::test_axis::{SimulatedTestAxis, TestAxis};
+
+/// An axis under its own PID.
+fn test_axis(index: usize, truth: &AxisParameters, seed: u64) -> SimulatedTestAxis {
+    let mut test_axis = SimulatedTestAxis::new(index, truth.clone(), seed);
+    let settings = measuring_settings(test_axis.settings());
+    test_axis.apply(&settings).unwrap();
+    test_axis
+}
+
+/// The runs of a commissioning.
+fn runs() -> StaticFrictionSettings {
+    StaticFrictionSettings {
+        velocities_mm_s: (0.1, 40.0),
+        ..StaticFrictionSettings::default()
+    }
+}
+
+/// Fewer and shorter ones, for levels alone.
+fn few_runs() -> StaticFrictionSettings {
+    StaticFrictionSettings {
+        velocities_mm_s: (0.4, 20.0),
+        count: 8,
+        ..StaticFrictionSettings::default()
+    }
+}
+
+fn mapped(test_axis: &mut SimulatedTestAxis, settings: &StaticFrictionSettings) -> FrictionMap {
+    measure(test_axis, settings, &mut |_| {}).unwrap().0
+}
+
+/// Friction of the positive direction by `factor`, of the negative by its mirror image around 1; nothing pushes.
+fn leaning(factor: f64) -> AxisParameters {
+    let mut truth = StageParameters::real().axes[0].clone();
+    truth.imperfections.offset_v = 0.0;
+    let mut mean = truth.friction.positive;
+    mean.curve.coulomb_v = 0.120;
+    mean.curve.breakaway_v = 0.150;
+    let directed = |factor: f64| {
+        let mut model = mean;
+        model.curve.coulomb_v *= factor;
+        model.curve.breakaway_v *= factor;
+        model
+    };
+    truth.friction = PerDirection {
+        positive: directed(factor),
+        negative: directed(2.0 - factor),
+    };
+    truth
+}
+
+#[test]
+fn every_axis_shows_its_friction_in_both_directions() {
+    for (index, truth) in StageParameters::real().axes.iter().enumerate() {
+        let map = mapped(&mut test_axis(index, truth, 1), &runs());
+        let found = fit_map(&map, Exponent::Fixed(1.0)).unwrap();
+        let offset_v = truth.imperfections.offset_v;
+        for (model, exact, pushed_v) in [
+            (
+                &found.directions.positive,
+                truth.friction.positive,
+                offset_v,
+            ),
+            (
+                &found.directions.negative,
+                truth.friction.negative,
+                -offset_v,
+            ),
+        ] {
+            let curve = model.model.curve;
+            let off = |value: f64, exact: f64| (value / exact - 1.0).abs();
+            let errors = [
+                off(curve.coulomb_v, exact.curve.coulomb_v - pushed_v),
+                off(curve.breakaway_v, exact.curve.breakaway_v - pushed_v),
+                off(
+                    curve.stribeck_velocity_mm_s,
+                    exact.curve.stribeck_velocity_mm_s,
+                ),
+            ];
+            for (error, most) in errors.into_iter().zip([0.03, 0.05, 0.20]) {
+                assert!(error < most, "axis {index}: {errors:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_friction_that_depends_on_direction_is_found() {
+    for factor in [1.15, 0.9] {
+        let map = mapped(&mut test_axis(0, &leaning(factor), 2), &few_runs());
+        let found = fit_map(&map, Exponent::Fixed(1.0)).unwrap().models();
+        let ratio = found.positive.curve.coulomb_v / found.negative.curve.coulomb_v;
+        let exact = factor / (2.0 - factor);
+        assert!((ratio / exact - 1.0).abs() < 0.02, "{ratio} for {exact}");
+    }
+}
+
+#[test]
+fn an_offset_of_the_amplifier_shows_as_the_difference_of_equal_frictions() {
+    let mut truth = leaning(1.0);
+    truth.imperfections.offset_v = 0.008;
+    let map = mapped(&mut test_axis(0, &truth, 3), &few_runs());
+    let found = fit_map(&map, Exponent::Fixed(1.0)).unwrap();
+    assert!((found.offset_v - 0.008).abs() < 5e-4, "{}", found.offset_v);
+    let (coulomb_v, _) = found.mean_levels_v();
+    assert!((coulomb_v / 0.120 - 1.0).abs() < 0.03, "{coulomb_v}");
+}
+
+#[test]
+fn stick_slip_at_the_low_end_is_detected_and_does_not_count() {
+    let settings = StaticFrictionSettings {
+        velocities_mm_s: (0.03, 20.0),
+        count: 12,
+        stretch_mm: 1.0,
+        ..StaticFrictionSettings::default()
+    };
+    let map = mapped(
+        &mut test_axis(0, &StageParameters::real().axes[0], 1),
+        &settings,
+    );
+    let slowest = map.runs.iter().filter(|run| run.velocity_mm_s.abs() < 0.04);
+    assert!(slowest.clone().count() == 2 && slowest.clone().all(|run| run.stick_slip));
+    let mut fast = map.runs.iter().filter(|run| run.velocity_mm_s.abs() > 1.0);
+    assert!(fast.all(|run| !run.stick_slip));
+    let found = fit_map(&map, Exponent::Fixed(1.0)).unwrap();
+    let stuck = map.runs.iter().filter(|run| run.stick_slip).count();
+    assert_eq!(found.stick_slip_runs, stuck);
+    assert!(found.directions.positive.speeds_mm_s.0 > 0.04);
+}
+
+#[test]
+fn an_axis_under_its_own_controller_does_not_stick_and_slip() {
+    let map = mapped(
+        &mut test_axis(0, &StageParameters::real().axes[0], 1),
+        &few_runs(),
+    );
+    assert_eq!(map.runs.len(), 16);
+    assert!(map.runs.iter().all(|run| !run.stick_slip));
+}
+
+#[test]
+fn a_map_that_is_too_thin_or_has_wrong_signs_is_refused() {
+    let mut map = mapped(
+        &mut test_axis(0, &StageParameters::real().axes[0], 1),
+        &few_runs(),
+    );
+    let thin = FrictionMap {
+        runs: map.runs[3..].to_vec(),
+    };
+    let error = fit_map(&thin, Exponent::Free).unwrap_err();
+    assert!(
+        matches!(
+            error,
+            FrictionFitError::TooFewRuns {
+                direction: "negative",
+                runs: 5
+            }
+        ),
+        "{error}"
+    );
+    for run in &mut map.runs {
+        run.voltage_v = -run.voltage_v;
+    }
+    let error = fit_map(&map, Exponent::Free).unwrap_err();
+    assert!(matches!(error, FrictionFitError::Sign { .. }), "{error}");
+}
+
+#[test]
+fn runs_that_cannot_be_made_are_refused_before_the_axis_moves() {
+    let mut test_axis = test_axis(0, &StageParameters::real().axes[0], 1);
+    let far = StaticFrictionSettings {
+        velocities_mm_s: (1.0, 90.0),
+        ..StaticFrictionSettings::default()
+    };
+    let error = measure(&mut test_axis, &far, &mut |_| {}).unwrap_err();
+    assert!(
+        matches!(error, StaticFrictionError::Travel { velocity_mm_s, .. } if velocity_mm_s > 50.0),
+        "{error}"
+    );
+    for settings in [
+        StaticFrictionSettings {
+            velocities_mm_s: (2.0, 1.0),
+            ..runs()
+        },
+        StaticFrictionSettings { count: 5, ..runs() },
+        StaticFrictionSettings {
+            stretch_mm: f64::NAN,
+            ..runs()
+        },
+    ] {
+        let error = measure(&mut test_axis, &settings, &mut |_| {}).unwrap_err();
+        assert!(matches!(error, StaticFrictionError::Setting(_)), "{error}");
+    }
+}
+
+#[test]
+fn the_level_at_rest_is_near_what_was_measured_where_no_run_was_slow() {
+    // Speed, mm/s, mean voltage and its deviation, V: the screw's cogging is in the means.
+    let seen = [
+        (17.067, 0.0970, 0.0015),
+        (19.005, 0.1020, 0.0019),
+        (21.089, 0.0848, 0.0007),
+        (29.066, 0.1041, 0.0015),
+        (32.286, 0.0935, 0.0016),
+        (36.009, 0.1162, 0.0007),
+        (39.981, 0.1074, 0.0016),
+    ];
+    let run = |sign: f64, (speed, voltage_v, deviation_v): (f64, f64, f64)| FrictionRun {
+        velocity_mm_s: sign * speed,
+        voltage_v: sign * voltage_v,
+        deviation_v,
+        stick_slip: false,
+    };
+    let backward = seen.into_iter().rev().map(|seen| run(-1.0, seen));
+    let map = FrictionMap {
+        runs: backward
+            .chain(seen.into_iter().map(|seen| run(1.0, seen)))
+            .collect(),
+    };
+    let found = fit_map(&map, Exponent::Fixed(1.0)).unwrap();
+    let (coulomb_v, breakaway_v) = found.mean_levels_v();
+    assert!(
+        breakaway_v < 1.5 * 0.1162 && coulomb_v > 0.0,
+        "{coulomb_v} {breakaway_v}"
+    );
+}

@@ -1,0 +1,159 @@
+//! Experiments on the simulated stage's axes.
+
+use quadrant_law::reference::{MotionSettings, PointToPointSettings};
+use quadrant_law::units::DacCode;
+use quadrant_settings::presets::x_axis;
+use quadrant_sim::plant::StageParameters;
+use quadrant_tune::record::Recording;
+use quadrant_tune::test_axis::{Drive, Experiment, ExperimentError, SimulatedTestAxis, TestAxis};
+
+fn test_axis(seed: u64) -> SimulatedTestAxis {
+    SimulatedTestAxis::new(0, StageParameters::real().axes[0].clone(), seed)
+}
+
+fn experiment(drive: Drive, injection_v: Vec<f64>) -> Experiment {
+    Experiment {
+        name: "test".to_owned(),
+        drive,
+        injection_v,
+        decimation: 1,
+        time_limit_s: 30.0,
+    }
+}
+
+fn moving(distance_mm: f64) -> Drive {
+    Drive::ClosedLoop(MotionSettings::PointToPoint(PointToPointSettings {
+        distance_mm,
+        max_velocity_mm_s: 20.0,
+        max_acceleration_mm_s2: 500.0,
+        max_jerk_mm_s3: 1e4,
+    }))
+}
+
+fn perform(
+    test_axis: &mut SimulatedTestAxis,
+    experiment: &Experiment,
+) -> Result<Recording, ExperimentError> {
+    test_axis.perform(experiment, &mut |_| {})
+}
+
+#[test]
+fn a_motion_is_recorded_from_its_start_to_its_end() {
+    let mut test_axis = test_axis(1);
+    let recording = perform(&mut test_axis, &experiment(moving(5.0), Vec::new())).unwrap();
+    let (first, last) = (recording.reference_mm[0], recording.reference_mm.last());
+    assert!((last.unwrap() - first - 5.0).abs() < 1e-3);
+    let tracking = recording.reference_mm.iter().zip(&recording.position_mm);
+    assert!(tracking.into_iter().all(|(r, y)| (r - y).abs() < 0.5));
+    assert!(recording.injection_v.iter().all(|v| *v == 0.0));
+}
+
+#[test]
+fn the_axis_stays_where_an_experiment_left_it() {
+    let mut test_axis = test_axis(1);
+    perform(&mut test_axis, &experiment(moving(5.0), Vec::new())).unwrap();
+    let back = perform(&mut test_axis, &experiment(moving(-5.0), Vec::new())).unwrap();
+    assert!((back.position_mm[0] - 5.0).abs() < 0.2);
+    assert!(back.position_mm.last().unwrap().abs() < 0.2);
+}
+
+#[test]
+fn an_open_loop_gets_the_injection_and_nothing_else() {
+    let mut test_axis = test_axis(1);
+    let injection: Vec<f64> = (0..500).map(|k| if k < 250 { 0.5 } else { -0.5 }).collect();
+    let recording = perform(
+        &mut test_axis,
+        &experiment(Drive::OpenLoop, injection.clone()),
+    )
+    .unwrap();
+    assert_eq!(recording.len(), 500);
+    // Half a step of the converter.
+    let worst = injection
+        .iter()
+        .zip(&recording.voltage_v)
+        .fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
+    assert!(worst <= 0.5 * DacCode(1).to_volts(10.0) + 1e-12);
+    assert!(recording.position_mm.iter().any(|y| *y > 0.1));
+}
+
+#[test]
+fn feedback_fights_an_injected_voltage() {
+    let mut test_axis = test_axis(1);
+    let held = Drive::ClosedLoop(MotionSettings::Hold);
+    let recording = perform(&mut test_axis, &experiment(held, vec![1.0; 5000])).unwrap();
+    let end = recording.len() - 1;
+    // The friction takes a part; the feedback the rest, less what holds the axis off its reference.
+    assert!(recording.voltage_v[end] < 0.25);
+    assert_eq!(recording.injection_v[end], 1.0);
+}
+
+#[test]
+fn decimation_averages_the_voltage_and_drops_an_incomplete_sample() {
+    let ramp: Vec<f64> = (0..1005).map(|k| 1e-5 * f64::from(k)).collect();
+    let mut coarse = experiment(Drive::OpenLoop, ramp);
+    coarse.decimation = 10;
+    let recording = perform(&mut test_axis(1), &coarse).unwrap();
+    assert_eq!(recording.len(), 100);
+    assert_eq!(recording.position_mm.len(), recording.voltage_v.len());
+    assert!((recording.sample_time_s - 1e-3).abs() < 1e-12);
+    assert!((recording.injection_v[50] - 1e-5 * 504.5).abs() < 1e-12);
+}
+
+#[test]
+fn an_axis_that_leaves_its_travel_is_stopped() {
+    let mut test_axis = test_axis(1);
+    let push = experiment(Drive::OpenLoop, vec![0.5; 100_000]);
+    let error = perform(&mut test_axis, &push).unwrap_err();
+    assert!(matches!(error, ExperimentError::Travel { .. }), "{error}");
+}
+
+#[test]
+fn an_axis_that_runs_away_is_stopped() {
+    let error = perform(
+        &mut test_axis(1),
+        &experiment(Drive::OpenLoop, vec![5.0; 10_000]),
+    )
+    .unwrap_err();
+    assert!(
+        matches!(error, ExperimentError::Overspeed { .. }),
+        "{error}"
+    );
+}
+
+#[test]
+fn an_experiment_that_does_not_end_in_time_says_what_it_waited_for() {
+    let mut endless = experiment(moving(50.0), Vec::new());
+    endless.time_limit_s = 1.0;
+    let error = perform(&mut test_axis(1), &endless).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "test: not ended after 1 s: the motion has not ended"
+    );
+}
+
+#[test]
+fn a_fault_of_the_law_ends_the_experiment() {
+    let mut test_axis = test_axis(1);
+    let held = Drive::ClosedLoop(MotionSettings::Hold);
+    let kick: Vec<f64> = vec![8.0; 20_000];
+    let error = perform(&mut test_axis, &experiment(held, kick)).unwrap_err();
+    assert!(matches!(error, ExperimentError::Fault { .. }), "{error}");
+}
+
+#[test]
+fn refused_settings_leave_the_old_ones_in_force() {
+    let mut test_axis = test_axis(1);
+    let before = test_axis.settings().clone();
+    let mut bad = x_axis();
+    bad.feedback.pid.kp_v_per_mm = -1.0;
+    assert!(test_axis.apply(&bad).is_err());
+    assert_eq!(test_axis.settings(), &before);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_recording() {
+    let record =
+        |seed| perform(&mut test_axis(seed), &experiment(moving(1.0), Vec::new())).unwrap();
+    assert_eq!(record(3), record(3));
+    assert_ne!(record(3), record(4));
+}
