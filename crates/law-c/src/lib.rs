@@ -3,7 +3,7 @@
 //! The same law, bit for bit, as in a firmware in Rust: PID, and feedforward of friction and inertia, on a reference of the
 //! caller's. An axis lies in memory of the caller's; nothing is allocated, and nothing waits.
 //!
-//! `docs/law-in-your-firmware.md` says how it is built and linked; `examples/axis.c` is a program that uses it.
+//! `docs/law-in-your-firmware.md` says how it is built and linked; `crates/law-c/examples/axis.c` is a program that uses it.
 #![cfg_attr(target_os = "none", no_std)]
 
 use core::mem::MaybeUninit;

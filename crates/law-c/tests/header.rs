@@ -63,7 +63,7 @@ fn library() -> PathBuf {
     built.max_by_key(written).expect("a static library")
 }
 
-/// Builds `examples/axis.c` and returns what it prints with these arguments.
+/// Builds `crates/law-c/examples/axis.c` and returns what it prints with these arguments.
 fn example(arguments: &[&str]) -> String {
     let folder = tempfile::tempdir().expect("a folder");
     let program = folder.path().join("axis");
