@@ -6,17 +6,13 @@
 //!
 //! - [`app`]: the work of the firmware's tasks, and the queues between them;
 //! - [`store`]: settings in flash that no power cut loses;
-//! - [`drivers`], [`hal`]: chips behind a bus, and the traits of a board;
-//! - [`link`]: frames and messages, a crate of their own;
-//! - [`lockstep`]: the channel between the emulated board and the host that simulates its stage.
+//! - [`drivers`], [`hal`]: chips behind a bus, and the traits of a board.
+//!
+//! Frames and messages of the link are [`quadrant_link`].
 #![no_std]
 #![forbid(unsafe_code)]
 
 pub mod app;
 pub mod drivers;
 pub mod hal;
-pub mod lockstep;
 pub mod store;
-
-/// The messages of the link, a crate of their own.
-pub use quadrant_link as link;

@@ -56,11 +56,11 @@ mod app {
         Control, Inputs, Intake, Liveness, Poll, Server, Snapshot, Supervision, TimingStatistics,
     };
     use quadrant::hal::{self, Amplifiers as _, Encoders as _, Switches as _, Watchdog as _};
-    use quadrant::link::message::NumberType;
     use quadrant_law::axes::AxisName;
     use quadrant_law::command::Command;
     use quadrant_law::safety::AxisSwitches;
     use quadrant_law::supervisor::Event;
+    use quadrant_link::message::NumberType;
 
     use crate::board::{
         self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, SettingsFlash,

@@ -1,7 +1,7 @@
 //! Requests to a machine by name, as the page makes them, and the messages of the link that they become.
 
-use quadrant::link::heapless::{String as Bounded, Vec as BoundedList};
-use quadrant::link::message::{
+use quadrant_link::heapless::{String as Bounded, Vec as BoundedList};
+use quadrant_link::message::{
     AxisName, Body, Channel, MAX_CHANNELS, SERIAL_VALUES_PER_S, SettingsRequest, TelemetryRequest,
     Value as LeafValue,
 };

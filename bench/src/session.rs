@@ -4,8 +4,8 @@
 
 use std::collections::BTreeMap;
 
-use quadrant::link::frame::{self, DELIMITER, DecodeError, FRAME_BYTES, Receiver};
-use quadrant::link::message::{
+use quadrant_link::frame::{self, DELIMITER, DecodeError, FRAME_BYTES, Receiver};
+use quadrant_link::message::{
     Body, Channel, LinkError, Message, Notice, Reply, Request, SettingsRequest, TelemetryBlock,
     TelemetryRequest, Value as LeafValue,
 };
@@ -212,10 +212,10 @@ pub fn channels() -> Value {
 
 #[cfg(test)]
 mod tests {
-    use quadrant::link::message::{
+    use quadrant_link::message::{
         AxisName, AxisSignal, Event, MAX_CHANNELS, Response, SampleWords, TelemetryBlock,
     };
-    use quadrant::link::server::LinkServer;
+    use quadrant_link::server::LinkServer;
 
     use super::*;
 
@@ -307,7 +307,7 @@ mod tests {
     #[test]
     fn a_refusal_and_a_restart_are_distinguished() {
         let mut session = Session::default();
-        let text = quadrant::link::message::text(format_args!("home x first"));
+        let text = quadrant_link::message::text(format_args!("home x first"));
         let refused = exchange(&mut session, r#""enable""#, Err(LinkError::Refused(text)));
         assert_eq!(refused["error"], "refused: home x first");
         assert_eq!(refused["restarted"], false);

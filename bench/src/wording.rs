@@ -1,6 +1,6 @@
 //! The machine's answers as JSON for the page: names instead of numbers, times in s, errors in um.
 
-use quadrant::link::message::{
+use quadrant_link::message::{
     AxisName, AxisSet, AxisStatus, Event, FaultReport, INPUTS, Inputs, LimitedBy, Status,
 };
 use quadrant_settings::StageSettings;

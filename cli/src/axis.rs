@@ -33,7 +33,7 @@ impl From<Axis> for AxisName {
     }
 }
 
-impl From<Axis> for quadrant::link::message::AxisName {
+impl From<Axis> for quadrant_link::message::AxisName {
     fn from(axis: Axis) -> Self {
         Translated::translated(AxisName::from(axis))
     }

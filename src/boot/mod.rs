@@ -8,11 +8,11 @@ use core::mem::MaybeUninit;
 use quadrant::app::crash_record::CrashCause;
 use quadrant::app::{Axis, Control, ControlEnds, Intake, Server, ServerParts};
 use quadrant::hal::ResetCause;
-use quadrant::link::message::NumberType;
 use quadrant_law::axes::AxisName;
 use quadrant_law::safety::{FaultCode, Operation};
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::Plan;
+use quadrant_link::message::NumberType;
 use quadrant_settings::StageSettings;
 
 use self::settings::{Loaded, count_start, load};

@@ -1,11 +1,11 @@
 //! The settings to start with: those in flash, or those of a job that a host has left.
 
 use quadrant::app::start_record::StartRecord;
-use quadrant::link::message::Provenance;
 use quadrant::store::{BUFFER_BYTES, Finding, Store};
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::Plan;
+use quadrant_link::message::Provenance;
 use quadrant_settings::Job;
 use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
 

@@ -5,8 +5,8 @@
 use std::collections::VecDeque;
 
 use anyhow::{Result, ensure};
-use quadrant::lockstep::InputRecord;
 use quadrant_law::stage::Outputs;
+use quadrant_lockstep::InputRecord;
 
 use crate::reference_model::{ReferenceModel, Tally};
 

@@ -2,11 +2,11 @@
 //! the end of their travel.
 
 use anyhow::{Context, Result, bail, ensure};
-use quadrant::link::message::{
+use quadrant_law::command::Command;
+use quadrant_link::message::{
     AxisName, AxisSignal, Body, CaptureRequest, Channel, Edge, Level, Reply, SetPoint,
     StreamRequest, Trigger,
 };
-use quadrant_law::command::Command;
 
 use crate::faults::approach::{LONGEST, SPEED_MM_S, homed};
 use crate::faults::case::configuration;

@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 use std::f64::consts::FRAC_PI_2;
 
 use anyhow::{Context, Result, bail, ensure};
-use quadrant::link::message::{Body, CaptureRequest, Trigger};
 use quadrant_law::command::Command;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_link::message::{Body, CaptureRequest, Trigger};
 use serde::{Deserialize, Serialize};
 
 use crate::attribution::Attribution;

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use anyhow::{Context, Result, ensure};
-use quadrant::lockstep::{BASE, InputRecord, Mode, OutputRecord, RECORDED_OUTPUTS};
 use quadrant_host::machine::emulator::Memory;
 use quadrant_law::safety::Switches;
+use quadrant_lockstep::{BASE, InputRecord, Mode, OutputRecord, RECORDED_OUTPUTS};
 use quadrant_settings::Job;
 use xtask::image::{self, Board, Image, Scalar, Target};
 use xtask::toolchain::Toolchain;

@@ -1,8 +1,8 @@
 //! Load on the firmware's link and capture.
 
 use anyhow::{Result, anyhow, ensure};
-use quadrant::link::frame::{self, FRAME_BYTES};
-use quadrant::link::message::{
+use quadrant_link::frame::{self, FRAME_BYTES};
+use quadrant_link::message::{
     AxisName, AxisSignal, Body, Channel, MAX_CHANNELS, Request, TelemetryRequest,
 };
 

@@ -4,11 +4,11 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
-use quadrant::lockstep::{
-    InputRecord, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
-};
 use quadrant_host::machine::emulator::{Clock, Emulator, Lockstep, Memory};
 use quadrant_law::stage::Outputs;
+use quadrant_lockstep::{
+    InputRecord, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
+};
 use quadrant_settings::Job;
 use xtask::image::{self, Board, Image, Scalar, Target};
 use xtask::toolchain::Toolchain;

@@ -4,7 +4,6 @@ use std::marker::PhantomData;
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use quadrant::lockstep::InputRecord;
 use quadrant_host::machine::emulator::{Program, input_of, record_of};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
@@ -12,6 +11,7 @@ use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant_law::motion::MotionMode;
 use quadrant_law::scalar::{Fixed, Scalar};
 use quadrant_law::stage::Outputs;
+use quadrant_lockstep::InputRecord;
 use quadrant_settings::Job;
 use quadrant_sim::benchmark_job::circle_and_sine;
 use quadrant_sim::law_machine::{LawMachine, Operator};

@@ -1,7 +1,7 @@
 //! The holding brake, as a host sees it.
 
-use quadrant::link::message::{AxisName as WireAxis, Body, LinkError, Provenance, SettingsRequest};
 use quadrant_fault_bench::tasks::Tasks;
+use quadrant_link::message::{AxisName as WireAxis, Body, LinkError, Provenance, SettingsRequest};
 
 use crate::preemption;
 

@@ -4,10 +4,10 @@ use proptest::prelude::*;
 use quadrant::app::capture::{Capture, CaptureError};
 use quadrant::app::glitch_monitor::GlitchReadings;
 use quadrant::app::telemetry::{Observation, Selection};
-use quadrant::link::message::{
+use quadrant_law::command::Command;
+use quadrant_link::message::{
     CaptureCause, CapturePhase, Channel, Edge, Level, MAX_CHANNELS, Trigger,
 };
-use quadrant_law::command::Command;
 use quadrant_settings::StageSettings;
 
 use quadrant_test_support::{Rig, repeatable, sine_on_x};

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use quadrant::link::message::{
-    AxisName, AxisPoint, Body, InjectRequest, Motion, Plan, PointToPoint, Reply, SetPoint,
-    SettingsRequest, StreamRequest,
-};
 use quadrant_fault_bench::tasks::Tasks;
 use quadrant_law::axes::AxisName as LawAxis;
 use quadrant_law::command::Command;
 use quadrant_law::friction::Direction;
 use quadrant_law::reference::Velocity;
 use quadrant_law::safety::{AxisSwitches, Switches};
+use quadrant_link::message::{
+    AxisName, AxisPoint, Body, InjectRequest, Motion, Plan, PointToPoint, Reply, SetPoint,
+    SettingsRequest, StreamRequest,
+};
 use quadrant_settings::draft::Draft;
 use quadrant_settings::{HomeSwitch, HomingSettings, StageSettings, TravelSettings};
 

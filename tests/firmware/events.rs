@@ -1,9 +1,9 @@
 //! The supervisor's events as notices of the link.
 
 use quadrant::app::Translated;
-use quadrant::link::message::{AxisName, Event};
 use quadrant_law::safety::FaultCode;
 use quadrant_law::supervisor;
+use quadrant_link::message::{AxisName, Event};
 
 #[test]
 fn the_supervisors_events_have_their_notice() {

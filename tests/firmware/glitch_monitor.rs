@@ -2,10 +2,10 @@
 
 use quadrant::app::Snapshot;
 use quadrant::app::glitch_monitor::{GlitchEvent, GlitchMonitor, degrees, root};
-use quadrant::link::message::AxisName;
 use quadrant_law::safety::SafetyState;
 use quadrant_law::supervisor::PERIOD_TICKS;
 use quadrant_law::units::Position;
+use quadrant_link::message::AxisName;
 
 /// Length of a count, mm.
 const RESOLUTION_MM: f64 = 5e-4;

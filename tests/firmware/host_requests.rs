@@ -1,13 +1,13 @@
 //! Requests of a host on their whole way: from the link through server and queues to the tick, and back.
 
-use quadrant::link::message::{
-    AxisName, AxisPoint, AxisSet, AxisSignal, Body, CapturePhase, CaptureRequest, CaptureStatus,
-    Channel, Inputs, Reply, SetPoint, StreamRequest, TelemetryRequest, Trigger,
-};
 use quadrant_fault_bench::tasks::Tasks;
 use quadrant_law::command::Command;
 use quadrant_law::motion::MotionMode;
 use quadrant_law::safety::{AxisSwitches, FaultCode, HostNeeded, Switches};
+use quadrant_link::message::{
+    AxisName, AxisPoint, AxisSet, AxisSignal, Body, CapturePhase, CaptureRequest, CaptureStatus,
+    Channel, Inputs, Reply, SetPoint, StreamRequest, TelemetryRequest, Trigger,
+};
 
 use crate::preemption::{LINK_TIMEOUT_TICKS, safety, settings};
 

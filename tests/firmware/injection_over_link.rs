@@ -1,10 +1,10 @@
 //! An injection from the host's requests to the axis, by way of server, queues and control.
 
-use quadrant::link::message::{
-    AxisName as WireAxis, Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, Voltages,
-};
 use quadrant_law::axes::AxisName;
 use quadrant_law::units::DacCode;
+use quadrant_link::message::{
+    AxisName as WireAxis, Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, Voltages,
+};
 
 use crate::preemption::settings;
 use quadrant_fault_bench::tasks::Tasks;

@@ -1,13 +1,13 @@
 //! The words of the link's types for people, and their counts.
 
-use quadrant::link::frame::{DecodeError, EncodeError};
-use quadrant::link::message::{
+use quadrant_fault_bench::tasks::Tasks;
+use quadrant_link::frame::{DecodeError, EncodeError};
+use quadrant_link::message::{
     AxisName, AxisSet, AxisSignal, BLOCK_WORDS, Body, CaptureRequest, Channel, Event,
     InjectRequest, LearningState, MachineState, OscillationKind, Plan, Reply, SampleWords,
     SettingsRequest, StageSignal, Status, StreamRequest, TelemetryBlock, TelemetryRequest,
     Voltages, text,
 };
-use quadrant_fault_bench::tasks::Tasks;
 
 use crate::preemption::settings;
 

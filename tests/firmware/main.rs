@@ -16,7 +16,6 @@ mod glitch_monitor;
 mod host_requests;
 mod injection_over_link;
 mod link_words;
-mod lockstep_records;
 mod operation;
 mod oscillation_report;
 mod preemption;

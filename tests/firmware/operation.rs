@@ -1,8 +1,8 @@
 //! The rules of operation: enabling, motions that need their host, and the emergency stop.
 
-use quadrant::link::message::{AxisName as WireAxis, Body, InjectRequest, Voltages};
 use quadrant_law::command::Command;
 use quadrant_law::safety::{EnabledBy, FaultCode, HostNeeded, SafetyState};
+use quadrant_link::message::{AxisName as WireAxis, Body, InjectRequest, Voltages};
 use quadrant_settings::StageSettings;
 
 use crate::preemption::{LINK_TIMEOUT_TICKS, endless, plan, refused, safety, settings};

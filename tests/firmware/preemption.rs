@@ -1,14 +1,14 @@
 //! The tasks' agreements in every interleaving of them: nothing is decided on a state that has passed.
 
 use quadrant::app::link_timeout_ticks;
-use quadrant::link::frame::{self, FRAME_BYTES};
-use quadrant::link::message::{
-    AxisName, Body, Harmonic, LinkError, Motion, Plan, PointToPoint, Provenance, Reply, Request,
-    SettingsRequest,
-};
 use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::safety::{FaultCode, SafetyState};
+use quadrant_link::frame::{self, FRAME_BYTES};
+use quadrant_link::message::{
+    AxisName, Body, Harmonic, LinkError, Motion, Plan, PointToPoint, Provenance, Reply, Request,
+    SettingsRequest,
+};
 use quadrant_settings::StageSettings;
 
 use quadrant_fault_bench::flash::Flash;
@@ -112,7 +112,7 @@ pub(crate) fn set(path: &str, settings: &StageSettings) -> Body {
     let (kind, length) = settings.get_bytes(path, &mut bytes).expect("a leaf");
     Body::Settings(SettingsRequest::Set {
         path: path.try_into().expect("fits"),
-        value: quadrant::link::message::Value {
+        value: quadrant_link::message::Value {
             kind,
             bytes: heapless::Vec::from_slice(&bytes[..length]).expect("fits"),
         },

@@ -5,12 +5,12 @@ use quadrant::app::glitch_monitor::{CircleReading, GlitchReadings};
 use quadrant::app::telemetry::{
     Observation, Packer, Sample, Sampler, SamplerState, Selection, SelectionError, read,
 };
-use quadrant::link::message::{
+use quadrant_law::command::Command;
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_link::message::{
     AxisName, AxisSignal, Channel, MAX_CHANNELS, MachineState, StageSignal, TelemetryBlock,
     UnknownChannel, WordKind,
 };
-use quadrant_law::command::Command;
-use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 use quadrant_settings::StageSettings;
 
 use quadrant_test_support::{Rig, repeatable, sine_on_x};

@@ -3,11 +3,11 @@
 
 use std::time::{Duration, Instant};
 
-use quadrant::link::watch::{LinkWatch, Seen};
 use quadrant_chromium::Browser;
 use quadrant_host::machine::simulated::SimulatedMachine;
 use quadrant_law::axes::AxisName;
 use quadrant_law::safety::{AxisSwitches, Switches};
+use quadrant_link::watch::{LinkWatch, Seen};
 use quadrant_settings::StageSettings;
 use quadrant_sim::plant::StageParameters;
 use serde_json::{Value, json};

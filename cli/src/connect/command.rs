@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand, ValueEnum};
-use quadrant::link::message::Channel;
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::Output;
 use quadrant_host::machine::simulated_io;
+use quadrant_link::message::Channel;
 use quadrant_tune::test_axis::Travel;
 use strum::IntoStaticStr;
 

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use clap::{Arg, ArgAction, Command as Grammar, Subcommand};
-use quadrant::link::message::{AxisName, Channel};
 use quadrant_host::client::settings::whole_path;
+use quadrant_link::message::{AxisName, Channel};
 use quadrant_settings::leaves::{self, Range};
 use quadrant_settings::tree::is_part;
 use rustyline::completion::{Completer, FilenameCompleter, Pair};

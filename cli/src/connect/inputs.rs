@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use quadrant::link::message::{AxisName, Inputs};
 use quadrant_host::machine::simulated_io::INPUTS;
 use quadrant_law::safety::Switches;
+use quadrant_link::message::{AxisName, Inputs};
 use serde_json::{Value, json};
 
 use super::answer::{Answer, seconds};

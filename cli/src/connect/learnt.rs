@@ -1,9 +1,9 @@
 //! The friction that the axes have learnt: how it is shown, and how it is kept.
 
-use quadrant::link::message::{AxisLearning, Learning};
 use quadrant_cli::axis::Axis;
 use quadrant_host::client::{Client, adopt};
 use quadrant_law::axes::AxisName;
+use quadrant_link::message::{AxisLearning, Learning};
 use serde_json::{Value, json};
 
 use super::answer::Answer;

@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 
 use anyhow::{Context, bail};
 use quadrant::app::Translated;
-use quadrant::link::message::{self, AxisSet, Body, Status};
 use quadrant_cli::axis::Axis;
 use quadrant_host::client::settings::{self, whole_path};
 use quadrant_host::client::{Client, settle, with_reset};
 use quadrant_host::machine::serial_ports;
 use quadrant_law::axes::AxisName;
 use quadrant_law::safety::FaultCode;
+use quadrant_link::message::{self, AxisSet, Body, Status};
 use quadrant_written::fixed;
 use serde_json::json;
 

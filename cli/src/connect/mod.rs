@@ -26,9 +26,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use quadrant::link::message::{AxisMode, MachineState};
 use quadrant_cli::warn;
 use quadrant_host::client::Client;
+use quadrant_link::message::{AxisMode, MachineState};
 
 use self::answer::Answer;
 use self::command::Command;

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use quadrant::link::message::{CaptureStatus, Channel, Edge, Event, Level, Notice, Trigger};
 use quadrant_host::client::samples::{
     Samples, TelemetryRecorder, arm, capture_state, disarm, least_decimation, read_capture,
 };
 use quadrant_host::client::{Client, columns, settings};
+use quadrant_link::message::{CaptureStatus, Channel, Edge, Event, Level, Notice, Trigger};
 use serde_json::{Value, json};
 
 use super::answer::{Answer, name, seconds};

@@ -7,12 +7,12 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use quadrant::app::Translated;
-use quadrant::link::message::Body;
 use quadrant_cli::warn;
 use quadrant_gcode::{Limits, Program, Trajectory};
 use quadrant_host::client::set_points::{references_mm, set_points, stream};
 use quadrant_host::client::{Client, settings, settle};
 use quadrant_law::reference::{Sense, circle};
+use quadrant_link::message::Body;
 use quadrant_settings::PlanSettings;
 use serde_json::json;
 

@@ -5,10 +5,10 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use quadrant::link::message::Channel;
 use quadrant_cli::terminal;
 use quadrant_host::client::samples::{Samples, TelemetryRecorder, least_decimation};
 use quadrant_host::client::{columns, plot, settings};
+use quadrant_link::message::Channel;
 use quadrant_report::{Figure, Lines, Plot, Series, Style, stacked_svg};
 use quadrant_written::{fixed, whole};
 use serde_json::json;

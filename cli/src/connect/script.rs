@@ -7,9 +7,9 @@ use std::thread;
 use std::time::Duration;
 
 use anyhow::Context;
-use quadrant::link::message::Body;
 use quadrant_cli::{say, terminal};
 use quadrant_host::client::{Client, ClientError, settle};
+use quadrant_link::message::Body;
 use rustyline::config::Configurer;
 use rustyline::error::ReadlineError;
 use rustyline::history::DefaultHistory;

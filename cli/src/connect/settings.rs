@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
-use quadrant::link::message::{Applied, Body, SettingsRequest};
 use quadrant::store::PROVENANCE_BYTES;
 use quadrant_host::client::settings::{self, Before, Difference, whole_path};
 use quadrant_host::client::{Client, ClientError};
+use quadrant_link::message::{Applied, Body, SettingsRequest};
 use quadrant_sim::setting_value::{meant, short, shown};
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 use quadrant_written::whole;

@@ -6,12 +6,12 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::thread;
 
-use quadrant::link::PROTOCOL_VERSION;
-use quadrant::link::frame::{self, FRAME_BYTES};
-use quadrant::link::message::{
+use quadrant_link::PROTOCOL_VERSION;
+use quadrant_link::frame::{self, FRAME_BYTES};
+use quadrant_link::message::{
     Body, FaultReport, Identity, LinkError, Message, Notice, NumberType, Reply, text,
 };
-use quadrant::link::server::LinkServer;
+use quadrant_link::server::LinkServer;
 
 use crate::command;
 

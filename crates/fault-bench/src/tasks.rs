@@ -14,16 +14,16 @@ use quadrant::app::{
     TimingStatistics,
 };
 use quadrant::hal::{Serial, SettingsFlash};
-use quadrant::link::frame::{self, FRAME_BYTES, Receiver};
-use quadrant::link::message::{
-    Body, LinkError, Message, Notice, NumberType, Reply, Request, TelemetryBlock,
-};
 use quadrant::store::{BUFFER_BYTES, Provenance, Store};
 use quadrant_law::command::Command;
 use quadrant_law::encoder::EncoderReading;
 use quadrant_law::safety::FaultCode;
 use quadrant_law::stage::{Outputs, StageState};
 use quadrant_law::units::POSITION_FRACTION_BITS;
+use quadrant_link::frame::{self, FRAME_BYTES, Receiver};
+use quadrant_link::message::{
+    Body, LinkError, Message, Notice, NumberType, Reply, Request, TelemetryBlock,
+};
 use quadrant_settings::{PlanSettings, StageSettings};
 
 use crate::flash::{Flash, FlashError};

@@ -3,7 +3,7 @@
 use core::sync::atomic::Ordering;
 
 use cortex_m::peripheral::NVIC;
-use quadrant::lockstep::{
+use quadrant_lockstep::{
     HANGS_FROM, HANGS_UNTIL, INJECTED_FAULT, INJECTED_FAULT_TICK, InjectedFault,
 };
 

@@ -6,7 +6,7 @@ use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
 use quadrant::hal;
-use quadrant::lockstep::{FLASH, FLASH_BYTES};
+use quadrant_lockstep::{FLASH, FLASH_BYTES};
 
 use super::mailbox;
 

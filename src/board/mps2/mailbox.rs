@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{Ordering, fence};
 
-use quadrant::lockstep::{
+use quadrant_lockstep::{
     BASE, BOOT, BootBlock, JOB, MEMORY_BYTES, Mode, OUTPUT, RECORDED_TICKS, RESET, Reset,
 };
 

@@ -1,7 +1,7 @@
 //! The emulated machine: Arm MPS2 with the AN386 image (Cortex-M4F) or AN385 (Cortex-M3), as QEMU has them.
 //!
 //! There are no encoders and no amplifiers: counts come from, and codes go to, memory shared with a process on the
-//! host. See `quadrant::lockstep` for its map and the ways to run.
+//! host. See `quadrant_lockstep` for its map and the ways to run.
 
 pub(crate) mod device;
 mod fault_injection;
@@ -32,9 +32,9 @@ use self::nap::Nap;
 pub(crate) use self::serial::Serial;
 pub(crate) use self::watchdog::Watchdog;
 use super::{Finished, Outcome};
-use quadrant::lockstep::{
-    self, END_OF_RUN, InputRecord, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS,
-    RECORDED_TICKS, Reset,
+use quadrant_lockstep::{
+    END_OF_RUN, InputRecord, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
+    Reset,
 };
 
 /// Control ticks begun. Written by [`Tick::begin`] alone.
@@ -90,11 +90,11 @@ impl Board {
         let reset = mailbox::take_reset();
         if reset != Reset::PowerOn {
             serial::reset();
-            mailbox::write(lockstep::INPUT_SEQUENCE, 0);
-            mailbox::write(lockstep::OUTPUT_SEQUENCE, 0);
+            mailbox::write(quadrant_lockstep::INPUT_SEQUENCE, 0);
+            mailbox::write(quadrant_lockstep::OUTPUT_SEQUENCE, 0);
         }
-        let starts = mailbox::read(lockstep::STARTS).wrapping_add(1);
-        mailbox::write_sequence(lockstep::STARTS, starts);
+        let starts = mailbox::read(quadrant_lockstep::STARTS).wrapping_add(1);
+        mailbox::write_sequence(quadrant_lockstep::STARTS, starts);
         Self {
             encoders: Encoders { mode: boot.mode },
             switches: Switches,
@@ -220,7 +220,7 @@ impl hal::Amplifiers for Amplifiers {
         let mut held = codes;
         self.mismatches = [false; 3];
         if flags & InputRecord::SELDOM != 0 {
-            held = lockstep::held(codes, InputRecord::stuck_of(flags));
+            held = quadrant_lockstep::held(codes, InputRecord::stuck_of(flags));
             let [x, y, z] = codes;
             let [held_x, held_y, held_z] = held;
             self.mismatches = [x != held_x, y != held_y, z != held_z];
@@ -237,12 +237,12 @@ impl hal::Amplifiers for Amplifiers {
         match self.mode {
             Mode::Lockstep => {
                 let tick = TICKS.load(Ordering::Relaxed);
-                mailbox::write(lockstep::OUTPUT, low);
-                mailbox::write(lockstep::OUTPUT + 4, high);
-                let at = lockstep::output_offset(tick);
+                mailbox::write(quadrant_lockstep::OUTPUT, low);
+                mailbox::write(quadrant_lockstep::OUTPUT + 4, high);
+                let at = quadrant_lockstep::output_offset(tick);
                 mailbox::write(at, low);
                 mailbox::write(at + 4, high);
-                mailbox::write_sequence(lockstep::OUTPUT_SEQUENCE, tick);
+                mailbox::write_sequence(quadrant_lockstep::OUTPUT_SEQUENCE, tick);
             }
             Mode::Paced | Mode::Unpaced => {
                 let index = (self.earlier + record()).min(RECORDED_TICKS - 1);
@@ -288,7 +288,7 @@ impl Tick {
         let ticks = TICKS.load(Ordering::Relaxed).wrapping_add(1);
         TICKS.store(ticks, Ordering::Relaxed);
         let at = match self.mode {
-            Mode::Lockstep => lockstep::input_offset(ticks),
+            Mode::Lockstep => quadrant_lockstep::input_offset(ticks),
             Mode::Paced | Mode::Unpaced => RECORDED_INPUTS + InputRecord::BYTES * record(),
         };
         INPUTS.store(at as u32, Ordering::Relaxed);
@@ -356,7 +356,7 @@ impl Idle {
         let over = match self.mode {
             Mode::Lockstep => {
                 let ticks = TICKS.load(Ordering::Relaxed);
-                let asked = mailbox::read_sequence(lockstep::INPUT_SEQUENCE);
+                let asked = mailbox::read_sequence(quadrant_lockstep::INPUT_SEQUENCE);
                 if asked == ticks {
                     self.nap.turn();
                 } else if asked != END_OF_RUN {
@@ -398,7 +398,7 @@ impl Idle {
 /// to be done before the next tick begins.
 #[inline(always)]
 fn pend_next(ticks: u32) {
-    let asked = mailbox::read_sequence(lockstep::INPUT_SEQUENCE);
+    let asked = mailbox::read_sequence(quadrant_lockstep::INPUT_SEQUENCE);
     if asked != ticks && asked != END_OF_RUN && !ticks.is_multiple_of(PERIOD_TICKS) {
         NVIC::pend(device::Interrupt::CONTROL_TICK);
     }
@@ -415,17 +415,17 @@ fn pend_tick() {
 /// Zero codes, amplifiers disabled, from any context.
 pub(crate) fn outputs_off() {
     timer::CONTROL.stop();
-    mailbox::write(lockstep::OUTPUT, 0);
-    mailbox::write(lockstep::OUTPUT + 4, 0);
+    mailbox::write(quadrant_lockstep::OUTPUT, 0);
+    mailbox::write(quadrant_lockstep::OUTPUT + 4, 0);
 }
 
 /// Ends the emulator with an exit code that says how it went; a firmware that has failed resets the processor instead, as
 /// often as the host allows it.
 pub(crate) fn halt(outcome: Outcome) -> ! {
-    let resets = mailbox::read(lockstep::RESETS_LEFT);
+    let resets = mailbox::read(quadrant_lockstep::RESETS_LEFT);
     if outcome == Outcome::Failed && resets > 0 {
-        mailbox::write(lockstep::RESETS_LEFT, resets - 1);
-        mailbox::write(lockstep::RESET, Reset::Software as u32);
+        mailbox::write(quadrant_lockstep::RESETS_LEFT, resets - 1);
+        mailbox::write(quadrant_lockstep::RESET, Reset::Software as u32);
         cortex_m::peripheral::SCB::sys_reset();
     }
     loop {

@@ -7,7 +7,7 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use quadrant::hal;
-use quadrant::lockstep::{
+use quadrant_lockstep::{
     LINK_BYTES, LINK_IN, LINK_IN_TAKEN, LINK_IN_WRITTEN, LINK_OUT, LINK_OUT_SHOWN, LINK_OUT_TAKEN,
     Mode,
 };

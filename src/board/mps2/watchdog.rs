@@ -3,7 +3,7 @@
 
 use cortex_m_rt::exception;
 use quadrant::hal;
-use quadrant::lockstep::{Mode, RESET, Reset};
+use quadrant_lockstep::{Mode, RESET, Reset};
 
 use super::{mailbox, timer};
 

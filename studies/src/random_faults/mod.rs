@@ -7,13 +7,13 @@ mod restart;
 mod summary;
 
 use clap::Args;
-use quadrant::link::message::{
-    AxisName, AxisSet, Body, Harmonic, InjectRequest, Motion, Plan, PointToPoint, Reply,
-    SettingsRequest, Voltages,
-};
 use quadrant_law::command::Command;
 use quadrant_law::safety::{SafetyState, Switches};
 use quadrant_law::units::DacCode;
+use quadrant_link::message::{
+    AxisName, AxisSet, Body, Harmonic, InjectRequest, Motion, Plan, PointToPoint, Reply,
+    SettingsRequest, Voltages,
+};
 use quadrant_settings::StageSettings;
 
 use quadrant_fault_bench::flash::{Damage, SECTOR};

@@ -1,9 +1,9 @@
 //! The start after the supply has failed: which settings are in force, and that nothing moves.
 
-use quadrant::link::message::{Body, Provenance, SettingsRequest};
 use quadrant::store::{BUFFER_BYTES, Loaded, Store};
 use quadrant_fault_bench::flash::Flash;
 use quadrant_fault_bench::tasks::Tasks;
+use quadrant_link::message::{Body, Provenance, SettingsRequest};
 use quadrant_settings::StageSettings;
 
 /// Room for GMS elements.

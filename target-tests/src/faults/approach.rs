@@ -2,8 +2,8 @@
 
 use anyhow::{Result, bail, ensure};
 use quadrant::app::Translated;
-use quadrant::link::message::{AxisSet, Body};
 use quadrant_law::axes::AxisName;
+use quadrant_link::message::{AxisSet, Body};
 
 use super::fixture::{A_WHILE, Fixture};
 

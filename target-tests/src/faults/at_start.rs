@@ -1,13 +1,13 @@
 //! Faults that a firmware finds when it starts: what ended the one before it, and stored settings that it refuses.
 
 use anyhow::{Result, anyhow, ensure};
-use quadrant::lockstep::{InjectedFault, Mode, OUTPUT, OutputRecord};
 use quadrant::store::{BUFFER_BYTES, Provenance, Store};
 use quadrant_host::machine::emulator::{Clock, Emulator, Memory};
 use quadrant_host::machine::memory_flash::MemoryFlash;
 use quadrant_law::friction::gms::{FIRMWARE_ELEMENTS, GmsElement};
 use quadrant_law::safety::FaultCode;
 use quadrant_law::stage::Outputs;
+use quadrant_lockstep::{InjectedFault, Mode, OUTPUT, OutputRecord};
 use quadrant_settings::StageSettings;
 use xtask::image::Image;
 

@@ -2,13 +2,13 @@
 
 use anyhow::Result;
 use quadrant::app::Translated;
-use quadrant::link::message::Body;
-use quadrant::lockstep::InputRecord;
 use quadrant_host::machine::memory_flash::MemoryFlash;
 use quadrant_law::axes::AxisName;
 use quadrant_law::encoder::EncoderReading;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::{AxisSwitches, FaultCode, Switches};
+use quadrant_link::message::Body;
+use quadrant_lockstep::InputRecord;
 use quadrant_settings::Job;
 use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_sim::plant::MarkParameters;

@@ -1,9 +1,9 @@
 //! The outcome of a fault injection.
 
 use anyhow::{Context, Result, bail, ensure};
-use quadrant::link::message::{Body, FaultReport};
 use quadrant_law::safety::{FaultCode, Reaction};
 use quadrant_law::stage::Outputs;
+use quadrant_link::message::{Body, FaultReport};
 use serde::{Deserialize, Serialize};
 
 use super::case::Case;

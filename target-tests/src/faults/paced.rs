@@ -1,13 +1,13 @@
 //! Faults that need a clock: the hardware timer paces the firmware, on recorded inputs, and instructions are its time.
 
 use anyhow::{Context, Result, ensure};
-use quadrant::lockstep::{
-    HANGS_FROM, HANGS_UNTIL, INJECTED_FAULT, INJECTED_FAULT_TICK, InjectedFault, InputRecord, Mode,
-    OutputRecord, RECORDED_OUTPUTS,
-};
 use quadrant_host::machine::emulator::{Clock, Emulator, Memory};
 use quadrant_law::safety::FaultCode;
 use quadrant_law::stage::Outputs;
+use quadrant_lockstep::{
+    HANGS_FROM, HANGS_UNTIL, INJECTED_FAULT, INJECTED_FAULT_TICK, InjectedFault, InputRecord, Mode,
+    OutputRecord, RECORDED_OUTPUTS,
+};
 use xtask::image::Image;
 
 use super::finding::{Finding, are_off, log_contains};

@@ -1,7 +1,7 @@
 //! The reference model's end of the link's port: what the emulated board does with its two rings.
 
 use quadrant::hal::Serial;
-use quadrant::lockstep::LINK_BYTES;
+use quadrant_lockstep::LINK_BYTES;
 
 /// A port between whose ends bytes are exchanged once a tick.
 #[derive(Debug, Default)]

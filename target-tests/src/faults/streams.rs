@@ -1,11 +1,11 @@
 //! Streams of a host at the rate of the machine's time, and the machine's reaction when they stop.
 
 use anyhow::{Context, Result, bail, ensure};
-use quadrant::link::message::AxisName;
-use quadrant::link::message::{
+use quadrant_law::units::DacCode;
+use quadrant_link::message::AxisName;
+use quadrant_link::message::{
     Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, SetPoint, StreamRequest, Voltages,
 };
-use quadrant_law::units::DacCode;
 
 use super::approach::{LONGEST, enabled};
 use super::fixture::Fixture;

@@ -86,9 +86,9 @@ fn waits_for_event(time: Duration) -> anyhow::Result<bool> {
 mod tests {
     use clap::Parser;
     use quadrant::app::Translated;
-    use quadrant::link::message::{Body, MachineState};
     use quadrant_host::machine::SimulatedLink;
     use quadrant_law::reference::{MotionSettings, PointToPointSettings};
+    use quadrant_link::message::{Body, MachineState};
     use quadrant_settings::PlanSettings;
     use quadrant_sim::stage_setup::StageSetup;
     use ratatui::Terminal;

@@ -4,14 +4,14 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::ensure;
-use quadrant::link::message::{
-    AxisName, Body, CapturePhase, Channel, FaultReport, Inputs, Learning, Notice, Status, Trigger,
-};
 use quadrant_host::client::samples::{
     Samples, TelemetryRecorder, arm, least_decimation, read_capture,
 };
 use quadrant_host::client::settings::{self, whole_path};
 use quadrant_host::client::{Client, ClientError, columns};
+use quadrant_link::message::{
+    AxisName, Body, CapturePhase, Channel, FaultReport, Inputs, Learning, Notice, Status, Trigger,
+};
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use crate::connect::command::WatchOptions;
@@ -275,7 +275,7 @@ impl Watch {
             Ok(_) => gain.value = value,
             // The draft goes back to the settings in force.
             Err(_) => {
-                let revert = quadrant::link::message::SettingsRequest::Revert;
+                let revert = quadrant_link::message::SettingsRequest::Revert;
                 client.order(Body::Settings(revert))?;
             }
         }

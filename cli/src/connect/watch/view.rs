@@ -1,8 +1,8 @@
 //! The picture: 80 x 24 and larger.
 
-use quadrant::link::message::{Channel, MachineState};
 use quadrant_cli::terminal::plain;
 use quadrant_host::client::{columns, with_reset};
+use quadrant_link::message::{Channel, MachineState};
 use quadrant_written::fixed;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};

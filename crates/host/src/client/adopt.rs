@@ -1,6 +1,6 @@
 //! The scale that an axis has learnt, taken into its settings.
 
-use quadrant::link::message::AxisName;
+use quadrant_link::message::AxisName;
 use quadrant_sim::setting_value::short;
 use serde::Serialize;
 

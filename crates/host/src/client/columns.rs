@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use quadrant::link::message::{AxisName, AxisSignal, Channel, StageSignal};
+use quadrant_link::message::{AxisName, AxisSignal, Channel, StageSignal};
 use quadrant_tune::record::{TraceError, write_trace};
 
 use super::samples::Samples;

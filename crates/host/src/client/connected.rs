@@ -3,8 +3,8 @@
 use std::error::Error;
 
 use quadrant::app::Translated;
-use quadrant::link::message::Body;
 use quadrant_law::axes::AxisName;
+use quadrant_link::message::Body;
 use quadrant_settings::StageSettings;
 use quadrant_tune::test_axis::{MachineError, TestAxis, Travel};
 

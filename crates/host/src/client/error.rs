@@ -3,8 +3,8 @@
 use std::io;
 use std::time::Duration;
 
-use quadrant::link::PROTOCOL_VERSION;
-use quadrant::link::message::LinkError;
+use quadrant_link::PROTOCOL_VERSION;
+use quadrant_link::message::LinkError;
 use quadrant_settings::tree::TreeError;
 
 /// Reason why a request was not carried out.

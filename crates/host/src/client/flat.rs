@@ -1,7 +1,7 @@
 //! Texts of a machine on one line: a line's end in one would make a line of its own where it is shown.
 
 use heapless::String;
-use quadrant::link::message::{Event, LinkError, Notice, Reply};
+use quadrant_link::message::{Event, LinkError, Notice, Reply};
 
 /// Puts a space in place of a line's end or a tab.
 fn flatten<const N: usize>(text: &mut String<N>) {

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use heapless::Vec as Bounded;
-use quadrant::link::message::{Body, CaptureRequest, CaptureStatus, Reply, TelemetryRequest};
-use quadrant::link::message::{CapturePhase, CaptureRecord, Trigger};
-use quadrant::link::message::{
+use quadrant_link::message::{Body, CaptureRequest, CaptureStatus, Reply, TelemetryRequest};
+use quadrant_link::message::{CapturePhase, CaptureRecord, Trigger};
+use quadrant_link::message::{
     Channel, MAX_CHANNELS, SERIAL_VALUES_PER_S, TelemetryBlock, WordKind,
 };
 

@@ -5,13 +5,13 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use quadrant::app::Translated;
-use quadrant::link::frame::{self, DELIMITER, DecodeError, FRAME_BYTES, Receiver};
-use quadrant::link::message::{
+use quadrant_law::safety::FaultCode;
+use quadrant_link::frame::{self, DELIMITER, DecodeError, FRAME_BYTES, Receiver};
+use quadrant_link::message::{
     AxisName, Body, Event, FaultReport, Identity, Inputs, Learning, LinkError, Message, Notice,
     Reply, Request, SettingsRequest, Status,
 };
-use quadrant::link::message::{MachineState, TelemetryBlock};
-use quadrant_law::safety::FaultCode;
+use quadrant_link::message::{MachineState, TelemetryBlock};
 
 use super::error::ClientError;
 use super::flat::{flatten_answer, flatten_notice};

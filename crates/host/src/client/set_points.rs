@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use heapless::Vec as Bounded;
-use quadrant::link::message::{
+use quadrant_gcode::{Trajectory, Vector};
+use quadrant_link::message::{
     AxisPoint, Body, Reply, STREAM_POINTS, SetPoint, Status, StreamRequest, StreamStatus,
 };
-use quadrant_gcode::{Trajectory, Vector};
 
 use super::error::ClientError;
 use super::session::Client;

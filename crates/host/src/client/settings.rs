@@ -1,7 +1,7 @@
 //! The machine's settings: leaf by leaf, and as a file.
 
 use heapless::String as Bounded;
-use quadrant::link::message::{Applied, Body, Reply, SettingsRequest, Value as LeafValue};
+use quadrant_link::message::{Applied, Body, Reply, SettingsRequest, Value as LeafValue};
 use quadrant_settings::StageSettings;
 use quadrant_settings::tree::{expand, is_part};
 use quadrant_sim::setting_value::{self, short};

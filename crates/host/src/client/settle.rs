@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use quadrant::link::message::{AxisMode, AxisName, AxisSet, MachineState, Status};
+use quadrant_link::message::{AxisMode, AxisName, AxisSet, MachineState, Status};
 
 use super::error::ClientError;
 use super::session::Client;

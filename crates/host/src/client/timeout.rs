@@ -2,9 +2,7 @@
 
 use std::time::Duration;
 
-use quadrant::link::message::{
-    Body, CaptureRequest, InjectRequest, SettingsRequest, StreamRequest,
-};
+use quadrant_link::message::{Body, CaptureRequest, InjectRequest, SettingsRequest, StreamRequest};
 
 /// Time for an answer: a request that computes little is served within two runs of the link's task, 2 ms, and a frame each way
 /// takes 12 ms.

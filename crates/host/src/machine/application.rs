@@ -9,13 +9,13 @@ use quadrant::app::{
     TimingStatistics,
 };
 use quadrant::hal::Serial;
-use quadrant::link::message::NumberType;
 use quadrant::store::{BUFFER_BYTES, LoadError, Loaded, Store};
 use quadrant_law::command::Command;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant_law::safety::FaultCode;
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::{Outputs, StageState};
+use quadrant_link::message::NumberType;
 use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant_sim::law_machine::TickInput;
 

@@ -6,13 +6,13 @@
 
 use std::collections::VecDeque;
 
-use quadrant::lockstep::{
-    FLASH, FLASH_BYTES, InputRecord, LINK_BYTES, LINK_IN, LINK_IN_TAKEN, LINK_IN_WRITTEN, LINK_OUT,
-    LINK_OUT_SHOWN, LINK_OUT_TAKEN, Mode,
-};
 use quadrant_law::safety::Switches;
 use quadrant_law::stage::Outputs;
 use quadrant_law::supervisor::PERIOD_TICKS;
+use quadrant_lockstep::{
+    FLASH, FLASH_BYTES, InputRecord, LINK_BYTES, LINK_IN, LINK_IN_TAKEN, LINK_IN_WRITTEN, LINK_OUT,
+    LINK_OUT_SHOWN, LINK_OUT_TAKEN, Mode,
+};
 use quadrant_settings::Job;
 use quadrant_settings::{PlanSettings, StageSettings};
 use quadrant_sim::plant::SimulatedStage;

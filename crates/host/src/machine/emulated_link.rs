@@ -4,8 +4,8 @@ use std::io;
 use std::path::Path;
 use std::time::Duration;
 
-use quadrant::lockstep::FLASH_BYTES;
 use quadrant_law::safety::Switches;
+use quadrant_lockstep::FLASH_BYTES;
 use quadrant_sim::stage_setup::StageSetup;
 
 use super::emulated::EmulatedMachine;

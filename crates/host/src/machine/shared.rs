@@ -14,13 +14,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use quadrant::link::frame::{self, DELIMITER, FRAME_BYTES};
-use quadrant::link::message::{
+use quadrant_law::axes::AxisName;
+use quadrant_link::frame::{self, DELIMITER, FRAME_BYTES};
+use quadrant_link::message::{
     Body, FaultReport, Identity, Inputs, Learning, LinkError, Message, Notice, Reply, Request,
     Status, text,
 };
-use quadrant::link::server::LinkServer;
-use quadrant_law::axes::AxisName;
+use quadrant_link::server::LinkServer;
 
 use super::simulated_io::SimulatedIo;
 use super::stream::or_none;

@@ -6,9 +6,9 @@ use std::collections::VecDeque;
 
 use quadrant::app::Poll;
 use quadrant::hal::Serial;
-use quadrant::link::message::NumberType;
 use quadrant_law::safety::Switches;
 use quadrant_law::stage::Outputs;
+use quadrant_link::message::NumberType;
 use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant_sim::plant::{SimulatedStage, StageParameters};
 

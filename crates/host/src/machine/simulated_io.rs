@@ -2,8 +2,8 @@
 
 use std::io;
 
-use quadrant::link::message;
 use quadrant_law::safety::Switches;
+use quadrant_link::message;
 
 /// Inputs, supply and log of a machine that is not a real one.
 pub trait SimulatedIo {

@@ -4,9 +4,9 @@ use std::io;
 use std::path::Path;
 use std::time::Duration;
 
-use quadrant::lockstep::FLASH_BYTES;
 use quadrant_law::safety::Switches;
 use quadrant_law::supervisor::PERIOD_TICKS;
+use quadrant_lockstep::FLASH_BYTES;
 use quadrant_sim::stage_setup::StageSetup;
 
 use super::flash_file::FlashFile;

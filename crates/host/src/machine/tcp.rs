@@ -4,7 +4,7 @@ use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
-use quadrant::link::frame::DELIMITER;
+use quadrant_link::frame::DELIMITER;
 
 use super::claim::Claim;
 use super::stream::{LEAST_TIMEOUT, TIMEOUT, ended, or_none};

@@ -3,7 +3,7 @@
 use std::io;
 use std::time::Duration;
 
-use quadrant::link::frame::{self, FRAME_BYTES};
+use quadrant_link::frame::{self, FRAME_BYTES};
 use serde::Serialize;
 
 use super::simulated_io::SimulatedIo;

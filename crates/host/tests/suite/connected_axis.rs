@@ -4,10 +4,6 @@
 use std::time::Duration;
 
 use quadrant::app::Translated;
-use quadrant::link::message::MachineState;
-use quadrant::link::message::{
-    AxisMode, Body, InjectRequest, InjectStatus, Reply, Status, Voltages,
-};
 use quadrant_host::client::test_axis::ConnectedAxis;
 use quadrant_host::client::{Client, ClientError, settings};
 use quadrant_host::machine::SimulatedLink;
@@ -15,6 +11,10 @@ use quadrant_law::axes::AxisName;
 use quadrant_law::reference::{MotionSettings, PointToPointSettings};
 use quadrant_law::safety::FaultCode;
 use quadrant_law::units::DacCode;
+use quadrant_link::message::MachineState;
+use quadrant_link::message::{
+    AxisMode, Body, InjectRequest, InjectStatus, Reply, Status, Voltages,
+};
 use quadrant_sim::plant::StageParameters;
 use quadrant_sim::stage_setup::StageSetup;
 use quadrant_tune::commission::bootstrap::{measuring_settings, zero_gain_settings};

@@ -2,11 +2,11 @@
 //! streams, moves, plans, jogs and stops.
 
 use quadrant::app::Translated;
-use quadrant::link::message::{self, AxisPoint, AxisSet, Body, SetPoint, StreamRequest};
 use quadrant_law::axes::AxisName;
 use quadrant_law::motion::MotionMode;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant_law::units::{POSITION_FRACTION_BITS, Position};
+use quadrant_link::message::{self, AxisPoint, AxisSet, Body, SetPoint, StreamRequest};
 use quadrant_settings::PlanSettings;
 use quadrant_test_support::Noise;
 

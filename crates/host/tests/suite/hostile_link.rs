@@ -10,14 +10,14 @@ use std::time::Instant;
 
 use quadrant::app::Poll;
 use quadrant::hal::Serial;
-use quadrant::link::frame::{self, FRAME_BYTES, PAYLOAD_BYTES};
-use quadrant::link::message::{
-    AxisSet, Body, LinkError, NumberType, Reply, Request, SettingsRequest, StreamRequest, Value,
-};
-use quadrant::link::server::LinkServer;
 use quadrant_host::machine::application::{BoardIdentity, Running, Start};
 use quadrant_host::machine::memory_flash::MemoryFlash;
 use quadrant_law::stage::Outputs;
+use quadrant_link::frame::{self, FRAME_BYTES, PAYLOAD_BYTES};
+use quadrant_link::message::{
+    AxisSet, Body, LinkError, NumberType, Reply, Request, SettingsRequest, StreamRequest, Value,
+};
+use quadrant_link::server::LinkServer;
 use quadrant_settings::{MAX_VALUE_BYTES, PlanSettings, StageSettings};
 use quadrant_sim::identified_stage::identified_settings;
 use quadrant_sim::plant::{SimulatedStage, StageParameters};
@@ -293,7 +293,7 @@ fn next(noise: &mut Noise, allowed: Allowed, paths: &[String]) -> Vec<u8> {
             };
             let mut buffer = [0; PAYLOAD_BYTES];
             let posted = postcard::to_slice(&request, &mut buffer).expect("fits");
-            let mut payload = [&[quadrant::link::PROTOCOL_VERSION], &*posted].concat();
+            let mut payload = [&[quadrant_link::PROTOCOL_VERSION], &*posted].concat();
             let at = noise.below(payload.len() as u64) as usize;
             payload[at] = noise.bits() as u8;
             payload.truncate(PAYLOAD_BYTES);

@@ -1,13 +1,13 @@
 //! A session with the firmware's application, through its port alone.
 
-use quadrant::link::frame::{self, FRAME_BYTES, Receiver};
-use quadrant::link::message::{AxisName, Channel, MachineState};
-use quadrant::link::message::{
+use quadrant_host::machine::simulated::SimulatedMachine;
+use quadrant_law::safety::Switches;
+use quadrant_link::frame::{self, FRAME_BYTES, Receiver};
+use quadrant_link::message::{AxisName, Channel, MachineState};
+use quadrant_link::message::{
     AxisSet, Body, CaptureRequest, Event, LinkError, Message, Notice, Reply, Request, Response,
     SettingsRequest, Status, StreamRequest, TelemetryRequest, Value,
 };
-use quadrant_host::machine::simulated::SimulatedMachine;
-use quadrant_law::safety::Switches;
 use quadrant_settings::{MAX_VALUE_BYTES, StageSettings};
 use quadrant_sim::identified_stage::identified_settings;
 use quadrant_sim::plant::StageParameters;
@@ -325,7 +325,7 @@ fn a_stream_whose_host_falls_silent_brakes_and_latches() {
     for _ in 0..6 {
         let points = (0..8)
             .map(|k| {
-                let mut point = quadrant::link::message::SetPoint::default();
+                let mut point = quadrant_link::message::SetPoint::default();
                 let t = 0.01 * f64::from(sequence + k + 1);
                 let rise = t.min(0.5);
                 point.axes[0].position_mm = rise * rise + (t - rise) * 1.0;

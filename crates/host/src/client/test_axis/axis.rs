@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use quadrant::app::Translated;
-use quadrant::link::message::{AxisSignal, Body, Channel, MachineState};
 use quadrant_law::axes::AxisName;
 use quadrant_law::reference::MotionSettings;
 use quadrant_law::safety::FaultCode;
+use quadrant_link::message::{AxisSignal, Body, Channel, MachineState};
 use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_tune::record::Recording;
 use quadrant_tune::test_axis::{

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use quadrant::link::message::AxisName;
-use quadrant::link::message::MachineState;
-use quadrant::link::message::{Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, Voltages};
 use quadrant_law::units::DacCode;
+use quadrant_link::message::AxisName;
+use quadrant_link::message::MachineState;
+use quadrant_link::message::{Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, Voltages};
 use quadrant_settings::AxisSettings;
 use quadrant_tune::test_axis::{Drive, Experiment};
 

@@ -94,7 +94,7 @@ impl Shape<'_> {
 
 #[cfg(test)]
 mod tests {
-    use quadrant::link::message::{AxisName, AxisSignal, Channel};
+    use quadrant_link::message::{AxisName, AxisSignal, Channel};
     use quadrant_settings::presets::x_axis;
 
     use super::*;

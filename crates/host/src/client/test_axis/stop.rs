@@ -1,7 +1,7 @@
 //! End of an experiment on a connected axis: put out in full, or stopped.
 
-use quadrant::link::message::InjectStatus;
 use quadrant_law::safety::{Fault, FaultCode};
+use quadrant_link::message::InjectStatus;
 use quadrant_tune::test_axis::{Experiment, ExperimentError};
 
 use crate::client::error::ClientError;

@@ -1,8 +1,8 @@
 //! Settings to and from the machine.
 
-use quadrant::link::message::{self, AxisSet};
 use quadrant_law::axes::AxisName;
 use quadrant_law::control::feedback::LawKind;
+use quadrant_link::message::{self, AxisSet};
 use quadrant_settings::StageSettings;
 use quadrant_tune::test_axis::Travel;
 

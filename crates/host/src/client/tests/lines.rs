@@ -5,8 +5,8 @@ use std::net::TcpListener;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use quadrant::link::message::Body;
-use quadrant::link::message::MachineState;
+use quadrant_link::message::Body;
+use quadrant_link::message::MachineState;
 
 use super::model::Model;
 use crate::client::Client;

@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use quadrant::link::message::AxisName;
-use quadrant::link::message::Trigger;
-use quadrant::link::message::{AxisSignal, Channel, StageSignal};
-use quadrant::link::message::{Body, SetPoint};
 use quadrant_gcode::{Limits, Program, Trajectory};
 use quadrant_law::reference::{MotionSettings, PointToPointSettings};
+use quadrant_link::message::AxisName;
+use quadrant_link::message::Trigger;
+use quadrant_link::message::{AxisSignal, Channel, StageSignal};
+use quadrant_link::message::{Body, SetPoint};
 use quadrant_tune::record::{AxisLimits, Record};
 use quadrant_tune::test_axis::{Drive, Experiment, TestAxis};
 

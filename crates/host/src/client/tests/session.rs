@@ -3,10 +3,10 @@
 use std::io;
 use std::time::Duration;
 
-use quadrant::link::frame::{self, FRAME_BYTES};
-use quadrant::link::message::AxisName;
-use quadrant::link::message::MachineState;
-use quadrant::link::message::{Body, Event, LinkError, Message, Notice, Reply, Response};
+use quadrant_link::frame::{self, FRAME_BYTES};
+use quadrant_link::message::AxisName;
+use quadrant_link::message::MachineState;
+use quadrant_link::message::{Body, Event, LinkError, Message, Notice, Reply, Response};
 
 use super::connected;
 use crate::client::{Client, ClientError, settings, settle};

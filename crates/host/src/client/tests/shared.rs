@@ -3,7 +3,7 @@
 use std::thread;
 use std::time::{Duration, Instant};
 
-use quadrant::link::message::{AxisName, Body, MachineState};
+use quadrant_link::message::{AxisName, Body, MachineState};
 
 use super::model::Model;
 use crate::client::{Client, ClientError};

@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use quadrant::lockstep::{
+use quadrant_law::stage::Outputs;
+use quadrant_lockstep::{
     END_OF_RUN, INPUT_SEQUENCE, InputRecord, LOCKSTEP_TICKS, Mode, OUTPUT_SEQUENCE, OutputRecord,
     input_offset, output_offset,
 };
-use quadrant_law::stage::Outputs;
 
 use super::backoff::Backoff;
 use super::error::EmulatorError;

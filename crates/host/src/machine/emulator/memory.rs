@@ -5,7 +5,7 @@ use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use quadrant::lockstep::{BOOT, BootBlock, JOB, JOB_BYTES, MEMORY_BYTES, Mode};
+use quadrant_lockstep::{BOOT, BootBlock, JOB, JOB_BYTES, MEMORY_BYTES, Mode};
 
 use super::error::EmulatorError;
 
@@ -89,7 +89,7 @@ impl Memory {
         self.write(BOOT, &block.encode())
     }
 
-    /// Reads bytes; `offset` is one of [`quadrant::lockstep`]'s.
+    /// Reads bytes; `offset` is one of [`quadrant_lockstep`]'s.
     ///
     /// # Errors
     /// The file fails.

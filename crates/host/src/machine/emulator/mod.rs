@@ -1,5 +1,5 @@
 //! QEMU with the firmware in it, and the memory through which a host plays its stage
-//! ([`quadrant::lockstep`] is its map).
+//! ([`quadrant_lockstep`] is its map).
 
 mod backoff;
 mod error;

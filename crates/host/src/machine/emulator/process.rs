@@ -3,7 +3,7 @@
 use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
-use quadrant::lockstep::MEMORY_BYTES;
+use quadrant_lockstep::MEMORY_BYTES;
 
 use super::error::EmulatorError;
 use super::log::Log;

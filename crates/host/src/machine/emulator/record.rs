@@ -1,6 +1,6 @@
 //! Signals of a simulated stage as the channel's records, and back.
 
-use quadrant::lockstep::InputRecord;
+use quadrant_lockstep::InputRecord;
 use quadrant_sim::law_machine::TickInput;
 
 /// The inputs of a tick as a record, with converters and times that are well.

@@ -8,10 +8,10 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use quadrant::app::telemetry::{Packer, Sample, Selection};
-use quadrant::link::frame::{self, FRAME_BYTES};
-use quadrant::link::message::*;
-use quadrant::link::message::{AxisSignal, Channel, StageSignal};
-use quadrant::link::server::LinkServer;
+use quadrant_link::frame::{self, FRAME_BYTES};
+use quadrant_link::message::*;
+use quadrant_link::message::{AxisSignal, Channel, StageSignal};
+use quadrant_link::server::LinkServer;
 use quadrant_settings::StageSettings;
 
 use crate::machine::SimulatedPeer;
@@ -199,7 +199,7 @@ impl Model {
 
 /// Returns the word of a channel: positions as they are, and the tick where a test wants to recognise a sample.
 fn read(channel: Channel, position_mm: &[f64; 3], tick: u32) -> u32 {
-    let counts = |axis: quadrant::link::message::AxisName| position_mm[axis as usize] / 0.0005;
+    let counts = |axis: quadrant_link::message::AxisName| position_mm[axis as usize] / 0.0005;
     match channel {
         Channel::Axis(axis, AxisSignal::Position) => counts(axis).round() as i32 as u32,
         Channel::Axis(axis, AxisSignal::Reference) => (256.0 * counts(axis)).round() as i32 as u32,

@@ -3,9 +3,9 @@
 use heapless::String as Bounded;
 use quadrant::app::Translated;
 use quadrant::app::telemetry::{Packer, Selection};
-use quadrant::link::message::*;
-use quadrant::link::message::{CaptureCause, CapturePhase, CaptureRecord};
-use quadrant::link::message::{LimitedBy, MachineState, SampleWords};
+use quadrant_link::message::*;
+use quadrant_link::message::{CaptureCause, CapturePhase, CaptureRecord};
+use quadrant_link::message::{LimitedBy, MachineState, SampleWords};
 use quadrant_settings::{MAX_VALUE_BYTES, StageSettings};
 
 use super::{Model, ROOM, read};
@@ -171,7 +171,7 @@ impl Model {
                     .map_err(|error| invalid(error.to_string()))?;
                 let old =
                     std::mem::replace(&mut self.bench.borrow_mut().in_force, settings.clone());
-                let changed = quadrant::link::message::AxisName::ALL
+                let changed = quadrant_link::message::AxisName::ALL
                     .into_iter()
                     .filter(|axis| old.axes[*axis as usize] != settings.axes[*axis as usize]);
                 Reply::Applied(Applied {

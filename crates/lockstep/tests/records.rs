@@ -1,9 +1,6 @@
 //! The records of the lockstep channel survive the way there and back.
 
 use proptest::prelude::*;
-use quadrant::lockstep::{
-    BootBlock, InjectedFault, InputRecord, JOB_BYTES, Mode, OutputRecord, Reset, held,
-};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::encoder::EncoderReading;
@@ -11,6 +8,9 @@ use quadrant_law::reference::Velocity;
 use quadrant_law::safety::{AxisSwitches, Switches};
 use quadrant_law::stage::Outputs;
 use quadrant_law::units::DacCode;
+use quadrant_lockstep::{
+    BootBlock, InjectedFault, InputRecord, JOB_BYTES, Mode, OutputRecord, Reset, held,
+};
 use quadrant_settings::Job;
 use quadrant_settings::{PlanSettings, StageSettings};
 

@@ -9,6 +9,9 @@
 //! In the recorded modes the inputs of all ticks lie in the memory beforehand and the outputs are collected there.
 //! All words are little-endian; offsets are bytes from the start of the memory.
 
+#![no_std]
+#![forbid(unsafe_code)]
+
 use strum::FromRepr;
 
 use quadrant_law::command::Command;
@@ -45,7 +48,7 @@ pub const INJECTED_FAULT_TICK: usize = 0x120;
 pub const HANGS_FROM: usize = 0x124;
 /// The clock the last time that a hanging firmware looked at it, a word.
 pub const HANGS_UNTIL: usize = 0x128;
-/// The job: a postcard-encoded [`Job`](quadrant_settings::Job).
+/// The job: a postcard-encoded `Job` of `quadrant-settings`.
 pub const JOB: usize = 0x200;
 /// Largest encoded job.
 pub const JOB_BYTES: usize = 0x7E00;
