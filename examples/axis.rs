@@ -12,7 +12,7 @@ fn main() -> Result<(), AxisError> {
     let sine = HarmonicSettings::with_velocity(10.0, 5.0, 1.0, 0.5);
     let motion = Motion::build(&MotionSettings::Harmonic(sine), SCALE);
     for kind in [FeedforwardKind::None, FeedforwardKind::Combined] {
-        let axis = Axis::<f32, 8>::build(SCALE, |axis| {
+        let axis = Axis::<f32>::build(SCALE, |axis| {
             axis.output(OutputStage::limited_to(10.0))
                 .pid(&GAINS, 2.0)
                 .feedforward(kind, &FeedforwardGains::whole(INERTIA), &friction, 0)

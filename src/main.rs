@@ -48,7 +48,7 @@ compile_error!("choose a board: `board-mps2` or `board-nucleo-f446re` (`cargo xt
 mod app {
     use core::sync::atomic::{AtomicU32, Ordering};
 
-    use heapless::spsc::{Consumer, Producer, Queue};
+    use heapless_queues::spsc::{Consumer, Producer, Queue};
     use quadrant::app::Translated;
     use quadrant::app::glitch_monitor::GlitchReadings;
     use quadrant::app::start_record::LASTING_RUNS;

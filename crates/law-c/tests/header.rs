@@ -121,7 +121,7 @@ fn words() -> Vec<i16> {
         kd_v_s_per_mm: 5.537e-3,
         derivative_filter_s: 52e-6,
     };
-    let axis = Axis::<f32, 8>::build(SCALE, |axis| {
+    let axis = Axis::<f32>::build(SCALE, |axis| {
         let whole = FeedforwardGains::whole(1.0 / 69390.0);
         axis.output(OutputStage::limited_to(9.0))
             .pid(&gains, 2.0)

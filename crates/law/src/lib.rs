@@ -50,7 +50,7 @@
 //! let gms = GmsParameters::new([(21.4, 0.30), (7.5, 0.30), (2.66, 0.25), (0.75, 0.15)], 5.0);
 //! let friction = FrictionSettings::new(sliding, gms);
 //! // Counts of 0.5 um, 10 000 ticks a second.
-//! let axis = Axis::<f32, 8>::build(MotionScale::new(0.5e-3, 1e4), |axis| {
+//! let axis = Axis::<f32>::build(MotionScale::new(0.5e-3, 1e4), |axis| {
 //!     axis.output(OutputStage::limited_to(9.0))
 //!         .pid(&gains, 2.0)
 //!         .feedforward(FeedforwardKind::Combined, &FeedforwardGains::whole(14.4e-6), &friction, 12)

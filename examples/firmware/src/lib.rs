@@ -36,8 +36,8 @@ const FRICTION: StaticFriction = StaticFriction {
 
 /// The axis, its memory, and the fault that switched it off.
 pub struct Servo {
-    axis: Axis<f32, 8>,
-    state: AxisState<f32, 8>,
+    axis: Axis<f32>,
+    state: AxisState<f32>,
     fault: Option<FaultCode>,
 }
 

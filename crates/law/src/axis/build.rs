@@ -10,6 +10,7 @@ use crate::decimal::Decimal;
 use crate::encoder::Encoder;
 use crate::feedforward::{FeedforwardGains, FeedforwardKind};
 use crate::friction::FrictionSettings;
+use crate::friction::gms::FIRMWARE_ELEMENTS;
 use crate::learning::Learning;
 use crate::motion::ReferenceGenerator;
 use crate::reference::MotionScale;
@@ -27,7 +28,7 @@ use core::fmt;
 ///
 /// Parts that are not given are absent: no feedforward, no homing, no limits but the amplifier's, and a 32-bit encoder.
 #[derive(Debug)]
-pub struct AxisBuilder<'a, S: Scalar, const N: usize> {
+pub struct AxisBuilder<'a, S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     axis: &'a mut Axis<S, N>,
     period_s: f64,
     error: Option<AxisError>,

@@ -12,7 +12,7 @@
 //! let gains = PidGains { kp_v_per_mm: 1.0, ki_v_per_mm_s: 0.5, kd_v_s_per_mm: 5e-3, derivative_filter_s: 50e-6 };
 //! // Counts of 0.5 um, 10 000 ticks a second, outputs within +-9 V of a converter of +-10 V.
 //! let scale = MotionScale::new(0.5e-3, 1e4);
-//! let axis = Axis::<f32, 8>::build(scale, |axis| axis.output(OutputStage::limited_to(9.0)).pid(&gains, 2.0))?;
+//! let axis = Axis::<f32>::build(scale, |axis| axis.output(OutputStage::limited_to(9.0)).pid(&gains, 2.0))?;
 //! let mut state = AxisState::default();
 //! axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(0)).unwrap();
 //! // Pushed one count away, the axis pushes back.
@@ -43,6 +43,7 @@ use crate::control::pid::Pid;
 use crate::control::terms::{FeedbackInput, FeedbackState, FeedbackTerms};
 use crate::encoder::{Encoder, EncoderReading};
 use crate::feedforward::{Feedforward, FeedforwardTerms, ReferenceStep};
+use crate::friction::gms::FIRMWARE_ELEMENTS;
 use crate::homing::HomingInput;
 use crate::learning::{Learning, LearningInput, LearningState, LearningStatus};
 use crate::motion::{GeneratorEvent, MotionMode, ReferenceGenerator};
@@ -68,12 +69,12 @@ const PREVIEW_ROOM: usize = MAX_PREVIEW_TICKS + 2;
 /// A speed in 2^-8 counts as a displacement.
 const SPEED_SHIFT: u32 = POSITION_FRACTION_BITS - 8;
 
-/// An axis ready for the tick; `N` is the room for GMS elements. Made by an [`AxisBuilder`].
+/// An axis ready for the tick; `N` is the room for GMS elements, the firmware's eight unless another is given. Made by an [`AxisBuilder`].
 ///
 /// Fields that every tick reads come first, and tables last: floating-point loads reach 1020 bytes from an address.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C)]
-pub struct Axis<S: Scalar, const N: usize> {
+pub struct Axis<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     encoder: Encoder,
     overspeed: Overspeed,
     /// Limit of the measured speed until the axis is homed, 2^-8 counts per tick; the largest number for none.

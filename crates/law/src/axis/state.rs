@@ -8,6 +8,7 @@ use crate::control::filter::FiltersState;
 use crate::control::terms::FeedbackState;
 use crate::encoder::EncoderState;
 use crate::feedforward::FeedforwardState;
+use crate::friction::gms::FIRMWARE_ELEMENTS;
 use crate::learning::LearningState;
 use crate::motion::{GeneratorState, MotionMode, ReferenceState};
 use crate::reference::{ReferenceSample, Segment};
@@ -22,7 +23,7 @@ use crate::units::Position;
 /// The memory of an axis. What every tick reads and writes comes first.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C)]
-pub struct AxisState<S: Scalar, const N: usize> {
+pub struct AxisState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     pub(super) encoder: EncoderState,
     pub(super) overspeed: OverspeedState,
     pub(super) signal_loss: SignalLossState,

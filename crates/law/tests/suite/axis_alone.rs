@@ -471,7 +471,7 @@ fn a_law_that_needs_the_velocity_of_the_reference_has_nothing_to_do_on_an_axis_t
 #[test]
 fn a_reference_from_elsewhere_gives_the_words_of_the_same_motion() {
     let settings = StageSettings::simulated();
-    let axis: Axis<f32, 8> = settings.build_axis(AxisName::X);
+    let axis: Axis<f32> = settings.build_axis(AxisName::X);
     let plan = sine_on_x(5.0, 10.0);
     let plan = plan.build::<f32>(&settings).expect("valid plan");
     let (mut own, mut elsewhere) = (AxisState::default(), AxisState::default());
@@ -498,7 +498,7 @@ fn a_reference_from_elsewhere_gives_the_words_of_the_same_motion() {
 #[test]
 fn a_reference_from_elsewhere_that_jumps_is_a_following_error() {
     let settings = StageSettings::simulated();
-    let axis: Axis<f32, 8> = settings.build_axis(AxisName::X);
+    let axis: Axis<f32> = settings.build_axis(AxisName::X);
     let mut state = AxisState::default();
     let mut follow = |mm: f64| {
         let ahead = ReferenceSample {
