@@ -123,11 +123,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         }
         self.commanded = inputs.command.is_some();
         self.switches = inputs.switches;
-        let axes = self.axes.each_ref().map(|axis| &**axis);
-        let stage = StageRef {
-            axes: axes.into(),
-            operation: &self.operation,
-        };
+        let stage = stage_of(&self.axes, &self.operation);
         let outputs = stage.tick(&self.plan, &mut self.state, inputs);
         if self.host.is_needed() {
             self.host.update(&self.state);
@@ -138,14 +134,10 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         outputs
     }
 
-    /// The stage in pieces.
+    /// The stage.
     #[inline(always)]
     fn stage(&self) -> StageRef<'_, S> {
-        let axes = self.axes.each_ref().map(|axis| &**axis);
-        StageRef {
-            axes: axes.into(),
-            operation: &self.operation,
-        }
+        stage_of(&self.axes, &self.operation)
     }
 
     /// Samples telemetry and capture after the outputs are written. Returns true if the supervising task's [`snapshot`] is
@@ -429,4 +421,17 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
 /// A plan that moves nothing.
 fn no_motion<S: Scalar>() -> Plan<S> {
     PerAxis::from_fn(|_| Motion::Hold)
+}
+
+/// The stage in pieces; of the fields by themselves, so that the tick may change others meanwhile.
+#[inline(always)]
+fn stage_of<'a, S: Scalar>(
+    axes: &'a PerAxis<&mut Axis<S>>,
+    operation: &'a Operation,
+) -> StageRef<'a, S> {
+    let axes = axes.each_ref().map(|axis| &**axis);
+    StageRef {
+        axes: axes.into(),
+        operation,
+    }
 }

@@ -64,13 +64,11 @@ pub struct PerAxis<T>([T; 3]);
 
 impl<T> PerAxis<T> {
     /// The values of x, y and z.
-    #[inline(always)]
     pub const fn new(values: [T; 3]) -> Self {
         Self(values)
     }
 
     /// The same value for every axis.
-    #[inline(always)]
     pub const fn splat(value: T) -> Self
     where
         T: Copy,
@@ -84,19 +82,16 @@ impl<T> PerAxis<T> {
     }
 
     /// Each value turned into another.
-    #[inline(always)]
     pub fn map<U>(self, change: impl FnMut(T) -> U) -> PerAxis<U> {
         PerAxis(self.0.map(change))
     }
 
     /// References to the values.
-    #[inline(always)]
     pub const fn by_ref(&self) -> PerAxis<&T> {
         PerAxis(self.0.each_ref())
     }
 
     /// Each value with that of another set for the same axis.
-    #[inline(always)]
     pub fn zip<U>(self, other: PerAxis<U>) -> PerAxis<(T, U)> {
         let ([a, b, c], [d, e, f]) = (self.0, other.0);
         PerAxis([(a, d), (b, e), (c, f)])
@@ -108,21 +103,18 @@ impl<T> PerAxis<T> {
     }
 
     /// The values of x, y and z.
-    #[inline(always)]
     pub fn into_array(self) -> [T; 3] {
         self.0
     }
 }
 
 impl<T> From<[T; 3]> for PerAxis<T> {
-    #[inline(always)]
     fn from(values: [T; 3]) -> Self {
         Self(values)
     }
 }
 
 impl<T> From<PerAxis<T>> for [T; 3] {
-    #[inline(always)]
     fn from(values: PerAxis<T>) -> Self {
         values.0
     }
@@ -137,14 +129,12 @@ impl<T: PartialEq> PartialEq<[T; 3]> for PerAxis<T> {
 impl<T> Deref for PerAxis<T> {
     type Target = [T; 3];
 
-    #[inline(always)]
     fn deref(&self) -> &[T; 3] {
         &self.0
     }
 }
 
 impl<T> DerefMut for PerAxis<T> {
-    #[inline(always)]
     fn deref_mut(&mut self) -> &mut [T; 3] {
         &mut self.0
     }
@@ -197,7 +187,6 @@ impl<T> IntoIterator for PerAxis<T> {
     type Item = T;
     type IntoIter = array::IntoIter<T, 3>;
 
-    #[inline(always)]
     fn into_iter(self) -> Self::IntoIter {
         self.0.into_iter()
     }
@@ -207,7 +196,6 @@ impl<'a, T> IntoIterator for &'a PerAxis<T> {
     type Item = &'a T;
     type IntoIter = core::slice::Iter<'a, T>;
 
-    #[inline(always)]
     fn into_iter(self) -> Self::IntoIter {
         self.0.iter()
     }
@@ -217,7 +205,6 @@ impl<'a, T> IntoIterator for &'a mut PerAxis<T> {
     type Item = &'a mut T;
     type IntoIter = core::slice::IterMut<'a, T>;
 
-    #[inline(always)]
     fn into_iter(self) -> Self::IntoIter {
         self.0.iter_mut()
     }

@@ -32,13 +32,11 @@ impl EncoderReading {
 
 impl EncoderReading {
     /// True if nothing is wrong with the reading and no index pulse passed.
-    #[inline(always)]
     pub(crate) const fn is_plain(&self) -> bool {
         self.index.is_none() && self.is_good()
     }
 
     /// True if nothing is wrong with the reading.
-    #[inline(always)]
     pub(crate) const fn is_good(&self) -> bool {
         self.fresh & self.valid
     }
@@ -79,13 +77,11 @@ pub struct EncoderState {
 
 impl EncoderState {
     /// The accumulated count; zero where the first reading was taken.
-    #[inline(always)]
     pub const fn count(&self) -> EncoderCount {
         EncoderCount(self.position.0 >> POSITION_FRACTION_BITS)
     }
 
     /// The accumulated count as a position.
-    #[inline(always)]
     pub const fn position(&self) -> Position {
         self.position
     }
@@ -144,7 +140,6 @@ impl Encoder {
     }
 
     /// True if the axis can have moved that far in a tick.
-    #[inline(always)]
     pub(crate) const fn is_plausible(&self, counts: i32) -> bool {
         // Between both ends, by one comparison.
         let largest = self.largest_step as u32;
@@ -152,7 +147,6 @@ impl Encoder {
     }
 
     /// The accumulated count at which the counter showed `raw`, within half its range of the last reading.
-    #[inline(always)]
     pub(crate) const fn count_at(&self, state: &EncoderState, raw: u32) -> EncoderCount {
         let back = self.between(raw, state.raw);
         EncoderCount(state.count().0.wrapping_sub(back as i64))

@@ -161,19 +161,16 @@ pub struct FeedforwardTerms<S> {
 
 impl<S: Scalar> FeedforwardTerms<S> {
     /// The sum of all terms, V.
-    #[inline(always)]
     pub fn total(&self) -> S {
         self.level + self.viscous + self.presliding + self.inertia
     }
 
     /// The friction, V.
-    #[inline(always)]
     pub fn friction(&self) -> S {
         self.level + self.viscous + self.presliding
     }
 
     /// Scales the friction but for its viscous part by a [`Quantity::Multiplier`].
-    #[inline(always)]
     pub(crate) fn gate_friction(&mut self, gate: S) {
         for term in [&mut self.level, &mut self.presliding] {
             *term = term.times(gate, Quantity::Multiplier);
@@ -181,7 +178,6 @@ impl<S: Scalar> FeedforwardTerms<S> {
     }
 
     /// Scales the friction by a [`Quantity::Multiplier`].
-    #[inline(always)]
     pub(crate) fn scale_friction(&mut self, scale: S) {
         for term in [&mut self.level, &mut self.viscous, &mut self.presliding] {
             *term = term.times(scale, Quantity::Multiplier);

@@ -152,7 +152,6 @@ impl<S: Scalar> Homing<S> {
     }
 
     /// The switch that this homing moves onto.
-    #[inline(always)]
     pub(crate) fn switch(&self) -> AxisSwitches {
         self.parameters.switch
     }

@@ -175,7 +175,6 @@ impl<S: Scalar> InjectionState<S> {
     }
 
     /// True while it is under way.
-    #[inline(always)]
     pub(crate) fn is_running(&self) -> bool {
         self.running
     }

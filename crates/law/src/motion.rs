@@ -104,7 +104,6 @@ impl<S: Scalar> ReferenceGenerator<S> {
     }
 
     /// The ramp of a controlled stop.
-    #[inline(always)]
     pub fn stop_ramp(&self) -> &Ramp<S> {
         &self.stop_ramp
     }
@@ -156,14 +155,12 @@ impl<S: Scalar> GeneratorState<S> {
     }
 
     /// Ends the motion that is followed or waits to begin.
-    #[inline(always)]
     pub(crate) fn hold(&mut self) {
         self.mode = MotionMode::Hold;
         self.waiting = 0;
     }
 
     /// Holds, and forgets the rest of a stream. The memory of a motion is made again when it starts.
-    #[inline(always)]
     pub(crate) fn reset(&mut self) {
         self.hold();
         self.stream.clear();

@@ -56,7 +56,6 @@ pub struct Inputs {
 
 impl Inputs {
     /// Sets fresh and valid raw counts in place of the encoders' readings.
-    #[inline(always)]
     pub fn set_counts(&mut self, counts: [u32; 3]) {
         self.readings = counts.map(EncoderReading::of).into();
     }
@@ -224,7 +223,6 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
     }
 
     /// Gives an axis the next segment of a stream; call it when [`AxisState::wants_segment`].
-    #[inline(always)]
     pub fn offer_segment(&mut self, axis: AxisName, segment: &Segment) {
         self.axes[axis].offer_segment(segment);
     }
@@ -357,13 +355,11 @@ impl<S: Scalar, const N: usize> Stage<S, N> {
     }
 
     /// One control period; see [`StageRef::tick`].
-    #[inline(always)]
     pub fn tick(&self, plan: &Plan<S>, state: &mut StageState<S, N>, inputs: &Inputs) -> Outputs {
         self.as_ref().tick(plan, state, inputs)
     }
 
     /// One control period of x alone; see [`StageRef::tick_x`].
-    #[inline(always)]
     pub fn tick_x(&self, plan: &Plan<S>, state: &mut StageState<S, N>, inputs: &Inputs) -> Outputs {
         self.as_ref().tick_x(plan, state, inputs)
     }
@@ -374,14 +370,12 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
     ///
     /// A fault found in this tick switches the outputs off in this tick, or begins a controlled stop, as its
     /// [`Reaction`] says. No path panics, allocates, or loops without a bound; every operation saturates.
-    #[inline(always)]
     pub fn tick(&self, plan: &Plan<S>, state: &mut StageState<S, N>, inputs: &Inputs) -> Outputs {
         self.tick_axes::<true>(plan, state, inputs)
     }
 
     /// One control period of x alone, for a host that simulates no other axis: y and z are neither read nor driven, so
     /// they must hold, and nothing but [`Command::StartMove`] of x may start a motion.
-    #[inline(always)]
     pub fn tick_x(&self, plan: &Plan<S>, state: &mut StageState<S, N>, inputs: &Inputs) -> Outputs {
         self.tick_axes::<false>(plan, state, inputs)
     }
@@ -706,7 +700,6 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
 }
 
 /// True if no axis found anything.
-#[inline(always)]
 fn is_empty(findings: &Findings) -> bool {
     let [x, y, z] = &**findings;
     x.is_ok() & y.is_ok() & z.is_ok()

@@ -27,7 +27,6 @@ impl Position {
     pub const ZERO: Self = Self(0);
 
     /// The displacement of a step of an encoder; never saturates.
-    #[inline(always)]
     pub(crate) const fn from_step(counts: i32) -> Self {
         Self((counts as i64) << POSITION_FRACTION_BITS)
     }
@@ -69,7 +68,6 @@ impl Position {
 
 impl Add for Position {
     type Output = Self;
-    #[inline(always)]
     fn add(self, other: Self) -> Self {
         Self(self.0.wrapping_add(other.0))
     }
@@ -77,7 +75,6 @@ impl Add for Position {
 
 impl Sub for Position {
     type Output = Self;
-    #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Self(self.0.wrapping_sub(other.0))
     }
@@ -85,7 +82,6 @@ impl Sub for Position {
 
 impl Neg for Position {
     type Output = Self;
-    #[inline(always)]
     fn neg(self) -> Self {
         Self(self.0.wrapping_neg())
     }
@@ -97,7 +93,6 @@ pub struct EncoderCount(pub i64);
 
 impl EncoderCount {
     /// The count as a position; saturates beyond what a [`Position`] holds.
-    #[inline(always)]
     pub const fn position(self) -> Position {
         Position(self.0.saturating_mul(1 << POSITION_FRACTION_BITS))
     }

@@ -378,7 +378,6 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     }
 
     /// Takes the count that was latched at an index pulse; returns true if it fits the last one.
-    #[inline(always)]
     fn take_pulse(&self, state: &mut AxisState<S, N>, raw: u32) -> bool {
         let at = self.encoder.count_at(&state.encoder, raw);
         state.pulse = Some(at.position());
@@ -386,13 +385,11 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     }
 
     /// True if the axis has to be homed before it may start more than jogs and homing.
-    #[inline(always)]
     pub(crate) fn awaits_homing(&self, state: &AxisState<S, N>) -> bool {
         (self.reduced_speed != u32::MAX) & !state.homed
     }
 
     /// True if the measured speed is that of an axis that stands. `begins` where `standstill` was not asked in the tick before.
-    #[inline(always)]
     pub(crate) fn stands(
         &self,
         state: &AxisState<S, N>,
@@ -823,7 +820,6 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     }
 
     /// The law, within what the output limit leaves beside `base`.
-    #[inline(always)]
     fn feed_back(
         &self,
         state: &mut FeedbackState<S>,

@@ -21,7 +21,6 @@ pub(super) struct RestState<S> {
 
 impl<S: Scalar> RestState<S> {
     /// True if the reference sets off or stops, by whether it moves now.
-    #[inline(always)]
     pub(super) fn changes(&self, moves: bool) -> bool {
         self.moves != moves
     }
@@ -39,13 +38,11 @@ impl<S: Scalar> RestState<S> {
     }
 
     /// Forgets the stop.
-    #[inline(always)]
     pub(super) fn forget(&mut self) {
         self.integral = None;
     }
 
     /// Takes note of a voltage that was taken from the integral, V.
-    #[inline(always)]
     pub(super) fn unload(&mut self, voltage: S) {
         if let Some(integral) = &mut self.integral {
             *integral = *integral - voltage;

@@ -97,7 +97,6 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
 
 impl<S: Scalar, const N: usize> AxisState<S, N> {
     /// The number of this tick of an axis that is driven by itself.
-    #[inline(always)]
     pub(super) fn count_tick(&mut self) -> u32 {
         let tick = self.ticks;
         self.ticks = tick.wrapping_add(1);
@@ -140,19 +139,16 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
     }
 
     /// Voltage that a host adds to the output, V.
-    #[inline(always)]
     pub fn injected(&self) -> S {
         self.injected
     }
 
     /// Measured position, 2^-16 counts.
-    #[inline(always)]
     pub(crate) fn measured(&self) -> Position {
         self.encoder.position()
     }
 
     /// Measured and filtered speed, 2^-8 counts per tick.
-    #[inline(always)]
     pub(crate) fn speed(&self) -> i32 {
         self.overspeed.speed()
     }
@@ -180,14 +176,12 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
     }
 
     /// True if there is room for a segment of a stream.
-    #[inline(always)]
     pub fn wants_segment(&self) -> bool {
         self.generator.stream.wants_segment()
     }
 
     /// Gives the axis the next segment of a stream; call it when [`AxisState::wants_segment`]. What is left of a stream
     /// that was broken off is dropped.
-    #[inline(always)]
     pub(crate) fn offer_segment(&mut self, segment: &Segment) {
         self.generator.stream.offer(segment);
     }
@@ -227,7 +221,6 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
     }
 
     /// The largest tracking error since enabling, against its limit.
-    #[inline(always)]
     pub fn following(&self) -> FollowingState<S> {
         self.following
     }

@@ -396,7 +396,6 @@ impl<S: Scalar> Cancelling<S> {
     }
 
     /// True if there is cancelling.
-    #[inline(always)]
     pub const fn is_on(&self) -> bool {
         self.on
     }
@@ -558,7 +557,6 @@ impl<S: Scalar> Cancelling<S> {
     }
 
     /// The voltage of a tick.
-    #[inline(always)]
     pub(crate) fn advance(&self, state: &mut CancellingState<S>) -> S {
         let voltage = state.voltage;
         state.voltage = voltage + state.slope;
@@ -566,7 +564,6 @@ impl<S: Scalar> Cancelling<S> {
     }
 
     /// Mean voltage of the ticks since the last step, V, half a tick early.
-    #[inline(always)]
     pub(crate) fn mean(&self, state: &CancellingState<S>) -> S {
         state.voltage - state.slope - state.slope
     }
@@ -651,7 +648,6 @@ impl<S: Scalar> CancellingState<S> {
     }
 
     /// Takes note that the output is at its limit.
-    #[inline(always)]
     pub(crate) fn saturate(&mut self) {
         self.saturated = true;
     }

@@ -37,7 +37,6 @@ impl<S: Scalar> Derivative<S> {
     }
 
     /// The error that a law acts on; one that is not a number counts as none.
-    #[inline(always)]
     pub(super) fn clip(&self, error: S) -> S {
         error.within(self.error_limit)
     }
@@ -51,7 +50,6 @@ impl<S: Scalar> Derivative<S> {
     }
 
     /// Adopts the memory of another law: the next step, from the error given, leaves the derivative as it is.
-    #[inline(always)]
     pub(super) fn take_over(&self, state: &mut FeedbackState<S>, error: S) {
         state.last_error = self.clip(error) - state.derivative.scale(self.steady_change);
     }

@@ -89,7 +89,6 @@ pub enum Feedback<S: Scalar> {
 
 impl<S: Scalar> Feedback<S> {
     /// True if the law reads the velocity of the reference.
-    #[inline(always)]
     pub const fn needs_velocity(&self) -> bool {
         matches!(self, Self::Scheduled(_) | Self::Cascade(_))
     }

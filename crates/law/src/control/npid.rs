@@ -98,7 +98,6 @@ impl<S: Scalar> NonlinearGainTable<S> {
     }
 
     /// f(e) = k(e) e, mm.
-    #[inline(always)]
     pub fn scaled_error(&self, error: S) -> S {
         error.times(self.at(error), Quantity::Multiplier)
     }

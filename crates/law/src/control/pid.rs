@@ -84,7 +84,6 @@ impl<S: Scalar> Pid<S> {
 
     /// Adopts the memory of a PID with other gains, or of one that saw another scaled error: the next step, from
     /// the scaled error given, leaves the derivative as it is.
-    #[inline(always)]
     pub fn take_over(&self, state: &mut FeedbackState<S>, error: S) {
         self.derivative.take_over(state, error);
     }

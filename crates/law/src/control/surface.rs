@@ -97,7 +97,6 @@ impl<S: Scalar> SurfaceLoop<S> {
     }
 
     /// Closes with `proportional` and `derivative`, whose sum drives the integral.
-    #[inline(always)]
     pub(super) fn close(
         &self,
         state: &mut FeedbackState<S>,

@@ -24,7 +24,6 @@ pub struct FeedbackState<S: Scalar> {
 
 impl<S: Scalar> FeedbackState<S> {
     /// The integral, V.
-    #[inline(always)]
     pub(crate) fn integral(&self) -> S {
         S::total(self.integral)
     }

@@ -169,7 +169,6 @@ impl<S: Scalar, const N: usize> GmsState<S, N> {
     };
 
     /// True if every element slips.
-    #[inline(always)]
     fn all_slip(&self) -> bool {
         self.slipping & Self::ALL == Self::ALL
     }
@@ -273,7 +272,6 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
         state.load(change, self.weights());
     }
 
-    #[inline(always)]
     fn weights(&self) -> impl Iterator<Item = S::Gain> + Clone {
         self.elements.iter().map(|element| element.weight)
     }

@@ -104,7 +104,6 @@ impl<S: Scalar, const N: usize> SmoothedGms<S, N> {
         state.load(change, self.weights());
     }
 
-    #[inline(always)]
     fn weights(&self) -> impl Iterator<Item = S::Gain> + Clone {
         self.elements.iter().map(|element| element.weight)
     }

@@ -143,7 +143,6 @@ impl<S: Scalar> SlidingTable<S> {
     }
 
     /// The surface at a speed (a non-negative velocity).
-    #[inline(always)]
     pub fn at(&self, speed: S, direction: Direction) -> Sliding<S> {
         let [level, decay] = self.tables.of(direction).at(speed);
         Sliding { level, decay }
@@ -158,7 +157,6 @@ fn decay(attraction_v_s: f64, step_s: f64, level_v: f64) -> f64 {
 impl<S: Scalar> Sliding<S> {
     /// The force of an element that slips, one step after `force`: it nears its share of the level. `along` turns a force into
     /// its component along the motion, and back.
-    #[inline(always)]
     pub(super) fn slip(&self, force: S, share: S, along: impl Fn(S) -> S) -> S {
         along(share + (along(force) - share).times(self.decay, Quantity::Fraction))
     }

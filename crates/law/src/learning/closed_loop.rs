@@ -101,13 +101,11 @@ impl<S: Scalar> ClosedLoop<S> {
     }
 
     /// The integral of the PID, V.
-    #[inline(always)]
     pub(super) fn integral(state: &ClosedLoopState<S>) -> S {
         S::total(state.integral)
     }
 
     /// Adds `voltage` to what the integral holds, V: the position does not change by it.
-    #[inline(always)]
     pub(super) fn hold_against(state: &mut ClosedLoopState<S>, voltage: S) {
         state.integral = (S::total(state.integral) + voltage).into_sum();
     }

@@ -364,7 +364,6 @@ impl<S: Scalar> Learning<S> {
     }
 
     /// True if there is learning.
-    #[inline(always)]
     pub const fn is_on(&self) -> bool {
         self.looks > 0
     }
@@ -439,7 +438,6 @@ impl<S: Scalar> Learning<S> {
     }
 
     /// The scale of the friction feedforward, a [`Quantity::Multiplier`].
-    #[inline(always)]
     fn scale(&self, state: &LearningState<S>) -> S {
         self.one + state.deviation
     }
@@ -607,7 +605,6 @@ impl<S: Scalar> Learning<S> {
 
 impl<S: Scalar> Fit<S> {
     /// The slope of the sum of squares towards a larger scale; zero at the scale of least error.
-    #[inline(always)]
     fn slope(self, scale: S) -> S {
         self.correlation - self.information.times(scale, Quantity::Multiplier)
     }
@@ -636,7 +633,6 @@ impl<S: Scalar> LearningState<S> {
     }
 
     /// Takes note that the output is at its limit.
-    #[inline(always)]
     pub(crate) fn saturate(&mut self) {
         self.saturated = true;
     }

@@ -112,13 +112,11 @@ impl<S: Scalar> Gate<S> {
 
 impl<S: Scalar> GateState<S> {
     /// Takes a tracking error of the next step, mm.
-    #[inline(always)]
     pub(super) fn add_error(&mut self, error: S) {
         self.sum = self.sum + error;
     }
 
     /// The gate less 1, within -1 to 0, a [`Quantity::Multiplier`].
-    #[inline(always)]
     pub(super) fn deviation(&self) -> S {
         self.deviation
     }

@@ -106,7 +106,6 @@ const NEVER: u32 = u32::MAX;
 const ONE: u32 = 1 << 31;
 
 /// A sine times an amplitude split in counts and 2^-16 counts, in 2^-16 counts.
-#[inline(always)]
 fn swing(sine: i32, counts: i32, fraction: i32) -> i64 {
     const SHIFT: u32 = SINE_BITS - POSITION_FRACTION_BITS;
     let product = |factor: i32| i64::from(sine) * i64::from(factor);
@@ -114,14 +113,12 @@ fn swing(sine: i32, counts: i32, fraction: i32) -> i64 {
 }
 
 /// `rate` times a Q31 factor.
-#[inline(always)]
 fn scaled_phase(rate: u64, factor: u32) -> u64 {
     let factor = u64::from(factor);
     (((rate >> 32) * factor) << 1) + (((rate & 0xFFFF_FFFF) * factor) >> 31)
 }
 
 /// The product of two Q31 numbers from 0 to 1.
-#[inline(always)]
 fn product(a: u32, b: u32) -> u32 {
     ((u64::from(a) * u64::from(b)) >> 31) as u32
 }
@@ -230,7 +227,6 @@ impl<S: Scalar> Harmonic<S> {
         (sample, cosine)
     }
 
-    #[inline(always)]
     fn phase(&self, state: &MotionState) -> u32 {
         ((state.phase >> 32) as u32).wrapping_add(self.start_phase)
     }
@@ -271,7 +267,6 @@ impl<S: Scalar> Harmonic<S> {
         self.end_tick != NEVER
     }
 
-    #[inline(always)]
     pub(super) fn finished(&self, state: &MotionState) -> bool {
         state.elapsed >= self.end_tick && self.ends()
     }

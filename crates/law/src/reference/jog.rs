@@ -24,7 +24,6 @@ impl JogState {
     }
 
     /// True if it has come to its end: it rests and nothing asks for motion.
-    #[inline(always)]
     pub fn finished(&self, ramp: &RampState) -> bool {
         (self.held_back || self.target == Velocity::ZERO) && ramp.is_at_rest()
     }

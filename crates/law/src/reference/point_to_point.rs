@@ -151,7 +151,6 @@ impl<S: Scalar> PointToPoint<S> {
         }
     }
 
-    #[inline(always)]
     pub(super) fn finished(&self, state: &MotionState) -> bool {
         usize::from(state.chain.impulse) == self.impulses.len()
     }

@@ -37,7 +37,6 @@ impl Velocity {
     }
 
     /// The velocity of a displacement in one tick, saturating.
-    #[inline(always)]
     pub const fn from_displacement(displacement: Position) -> Self {
         Self::clamped((displacement.clipped() as i64) << FRACTION_BITS)
     }
@@ -53,7 +52,6 @@ impl Velocity {
     }
 
     /// The whole position units per tick of the speed, rounded up.
-    #[inline(always)]
     const fn speed_units(self) -> u32 {
         (self.0.unsigned_abs() >> FRACTION_BITS) as u32 + 1
     }
@@ -72,7 +70,6 @@ impl Velocity {
 
 impl Neg for Velocity {
     type Output = Self;
-    #[inline(always)]
     fn neg(self) -> Self {
         // Within +-2^61: nothing to wrap.
         Self(self.0.wrapping_neg())
@@ -139,19 +136,16 @@ impl RampState {
     }
 
     /// Position of the reference.
-    #[inline(always)]
     pub const fn position(&self) -> Position {
         self.position
     }
 
     /// Velocity of the reference.
-    #[inline(always)]
     pub const fn velocity(&self) -> Velocity {
         self.velocity
     }
 
     /// True if neither velocity nor acceleration is left.
-    #[inline(always)]
     pub const fn is_at_rest(&self) -> bool {
         self.velocity.0 == 0 && self.level == 0
     }
@@ -217,13 +211,11 @@ impl<S: Scalar> Ramp<S> {
     }
 
     /// The level of a state. It may stem from a ramp with other limits, exchanged in flight.
-    #[inline(always)]
     fn level(&self, state: &RampState) -> i32 {
         state.level.max(-self.levels).min(self.levels)
     }
 
     /// `T(level)`, of a level that is not negative.
-    #[inline(always)]
     fn needed(&self, level: i32) -> i64 {
         let level = i64::from(level);
         self.jerk * (level * (level + 1) / 2)
@@ -284,7 +276,6 @@ impl<S: Scalar> Ramp<S> {
     /// A displacement that a stop from `velocity`, without acceleration at its begin, does not exceed. For a stop that
     /// reaches full braking it is exact but for two ticks of travel; for a slower one the arithmetic mean stands for
     /// the geometric in `v sqrt(v / J) <= v / 2 (v / A + A / J)`.
-    #[inline(always)]
     pub fn stopping_distance(&self, velocity: Velocity) -> Position {
         self.bound(velocity.speed_units(), 0)
     }
@@ -341,7 +332,6 @@ impl Factor {
         }
     }
 
-    #[inline(always)]
     const fn of(self, value: u32) -> u64 {
         (value as u64 * self.mantissa as u64) >> self.shift
     }

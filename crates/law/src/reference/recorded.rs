@@ -79,7 +79,6 @@ impl<S: Scalar> RecordedTable<S> {
         }
     }
 
-    #[inline(always)]
     pub(super) fn finished(&self, state: &MotionState) -> bool {
         // The last sample has been put out.
         state.phase > (self.samples.len().saturating_sub(1) as u64) << 32

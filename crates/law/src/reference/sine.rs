@@ -17,7 +17,6 @@ pub(crate) struct SinePolynomial {
 const HALF: i32 = 1 << 29;
 
 /// The upper half of a product.
-#[inline(always)]
 fn upper(a: i32, b: i32) -> i32 {
     ((i64::from(a) * i64::from(b)) >> 32) as i32
 }

@@ -92,7 +92,6 @@ pub struct StreamState {
 
 impl StreamState {
     /// The segment under way and the one after it.
-    #[inline(always)]
     const fn segments(&self) -> (&Segment, &Segment) {
         match (&self.slots, self.turned) {
             ([current, next], false) | ([next, current], true) => (current, next),
@@ -100,7 +99,6 @@ impl StreamState {
     }
 
     /// True if there is room for a segment.
-    #[inline(always)]
     pub const fn wants_segment(&self) -> bool {
         self.segments().1.ticks == 0
     }

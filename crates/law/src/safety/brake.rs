@@ -34,13 +34,11 @@ pub enum BrakeState {
 
 impl BrakeState {
     /// True if the current is on.
-    #[inline(always)]
     pub const fn has_current(self) -> bool {
         matches!(self, Self::Releasing(_) | Self::Released)
     }
 
     /// True while the brake takes its time.
-    #[inline(always)]
     pub const fn is_moving(self) -> bool {
         matches!(self, Self::Releasing(_) | Self::Applying(_))
     }

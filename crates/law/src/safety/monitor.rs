@@ -32,7 +32,6 @@ pub struct OverspeedState {
 
 impl OverspeedState {
     /// The filtered speed, 2^-8 counts per tick, towards larger positions.
-    #[inline(always)]
     pub fn speed(&self) -> i32 {
         self.filtered
     }
@@ -61,7 +60,6 @@ impl Overspeed {
     }
 
     /// True if the filtered speed is within the limit.
-    #[inline(always)]
     pub(crate) fn allows(&self, state: &OverspeedState) -> bool {
         // Between both ends, by one comparison.
         (state.filtered as u32).wrapping_add(self.limit) <= self.limit.wrapping_mul(2)

@@ -251,7 +251,6 @@ impl<S: Scalar> Oscillation<S> {
     }
 
     /// The share of the friction feedforward that acts, a [`Quantity::Multiplier`], while it is reduced.
-    #[inline(always)]
     pub fn share(&self, state: &OscillationState) -> S {
         S::scale_integer(i32::from(REDUCTION_STEPS - state.reduced), self.share)
     }
@@ -444,13 +443,11 @@ impl OscillationReading {
 
 impl OscillationState {
     /// True while less than all of the friction feedforward acts.
-    #[inline(always)]
     pub fn is_reduced(&self) -> bool {
         self.reduced > 0
     }
 
     /// The oscillation that was found last.
-    #[inline(always)]
     pub fn reading(&self) -> OscillationReading {
         self.reading
     }

@@ -72,7 +72,6 @@ const PUSH_BITS: u32 = 16;
 pub(super) const DUE_TICKS: u32 = 1 << INTERVAL_BITS;
 
 /// True in the ticks in which the axis of this index is compared.
-#[inline(always)]
 pub(crate) const fn is_due(tick: u32, index: usize) -> bool {
     tick & (DUE_TICKS - 1) == index as u32
 }
@@ -189,7 +188,6 @@ pub struct Shown {
 
 impl Shown {
     /// The low bits of a position of the reference, 2^-8 counts.
-    #[inline(always)]
     pub(crate) const fn reference(position: Position) -> i32 {
         (position.0 >> (POSITION_FRACTION_BITS - SPEED_FRACTION_BITS)) as i32
     }
@@ -490,7 +488,6 @@ impl Plausibility {
     }
 
     /// A motion between two comparisons in the unit of speeds, for as many ticks.
-    #[inline(always)]
     fn speed(&self, moved: i32) -> i32 {
         moved.saturating_mul(1 << self.shift)
     }
@@ -591,7 +588,6 @@ impl Heading {
 
 impl PlausibilityState {
     /// Leaves a mean word out of the output since the last comparison: one that nothing but a load answers.
-    #[inline(always)]
     pub(crate) fn leave_out(&mut self, word: i32) {
         self.words = self.words.wrapping_add(word << INTERVAL_BITS);
     }
@@ -625,13 +621,11 @@ fn whole_log2(value: f64) -> u32 {
 }
 
 /// The share of a value, rounded down.
-#[inline(always)]
 fn part(value: i32, share: i32) -> i32 {
     ((i64::from(value) * i64::from(share)) >> 32) as i32
 }
 
 /// The product of a value and a factor with fraction bits, rounded down, within what there is room for.
-#[inline(always)]
 fn scaled(value: i32, factor: i32, fraction_bits: u32) -> i32 {
     let product = (i64::from(value) * i64::from(factor)) >> fraction_bits;
     product.clamp(i32::MIN.into(), i32::MAX.into()) as i32

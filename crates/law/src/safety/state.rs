@@ -21,13 +21,11 @@ pub enum SafetyState {
 
 impl SafetyState {
     /// True if the outputs are enabled by request, and nothing is about to end that.
-    #[inline(always)]
     pub const fn is_enabled(self) -> bool {
         matches!(self, Self::Enabled)
     }
 
     /// True if the control law drives the outputs: enabled, or in a controlled stop after a fault.
-    #[inline(always)]
     pub const fn drives(self) -> bool {
         matches!(self, Self::Enabled | Self::Stopping(_))
     }

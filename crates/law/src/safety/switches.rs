@@ -40,7 +40,6 @@ impl AxisSwitches {
     pub const OUTPUT_MISMATCH: Self = Self(OUTPUT_MISMATCH);
 
     /// True if all of `others` are active.
-    #[inline(always)]
     pub const fn has(self, others: Self) -> bool {
         self.0 & others.0 == others.0
     }
@@ -57,7 +56,6 @@ impl AxisSwitches {
     }
 
     /// True if a limit switch is pressed.
-    #[inline(always)]
     pub const fn at_limit(self) -> bool {
         self.0 & (NEGATIVE_LIMIT | POSITIVE_LIMIT) != 0
     }
@@ -70,7 +68,6 @@ impl AxisSwitches {
 
     /// These but for `others`.
     #[must_use]
-    #[inline(always)]
     pub const fn without(self, others: Self) -> Self {
         Self(self.0 & !others.0)
     }
@@ -111,20 +108,17 @@ impl Switches {
     }
 
     /// The inputs of one axis.
-    #[inline(always)]
     pub const fn axis(self, axis: AxisName) -> AxisSwitches {
         AxisSwitches(self.0 >> (BITS_PER_AXIS * axis as u32) & ((1 << BITS_PER_AXIS) - 1))
     }
 
     /// True if the emergency stop is pressed.
-    #[inline(always)]
     pub const fn emergency_stop(self) -> bool {
         self.0 & EMERGENCY_STOP != 0
     }
 
     /// True if nothing speaks against enabled outputs. Limit and home switches do not: an axis must be able to leave
     /// them.
-    #[inline(always)]
     pub const fn are_good(self) -> bool {
         const BAD: u16 = AMPLIFIER_FAULT | OUTPUT_MISMATCH;
         self.0 & (EMERGENCY_STOP | BAD | BAD << BITS_PER_AXIS | BAD << (2 * BITS_PER_AXIS)) == 0

@@ -23,13 +23,11 @@ impl Range {
         }
     }
 
-    #[inline(always)]
     const fn holds(self, position: Position) -> bool {
         (position.0.wrapping_sub(self.low.0) as u64) < self.span
     }
 
     /// The upper end; one below the lower end if the range is empty.
-    #[inline(always)]
     const fn high(self) -> Position {
         Position(self.low.0.wrapping_add_unsigned(self.span).wrapping_sub(1))
     }
@@ -82,7 +80,6 @@ impl Travel {
     }
 
     /// True if the axis is inside its travel and could stop before the ends: [`step`](Self::step) then finds nothing.
-    #[inline(always)]
     pub(crate) fn is_clear(&self, reference: Position, measured: Position) -> bool {
         self.clear.holds(reference) && self.allowed.holds(measured)
     }
@@ -120,14 +117,12 @@ impl Travel {
 
 impl TravelState {
     /// Takes note that the axis is inside its travel.
-    #[inline(always)]
     pub(crate) fn enter(&mut self) {
         self.inside = true;
     }
 }
 
 /// The distance of a tick at this speed, and of a stop after it.
-#[inline(always)]
 fn stop_from<S: Scalar>(ramp: &Ramp<S>, speed: Position) -> Position {
     ramp.stopping_distance(Velocity::from_displacement(speed))
         .saturating_add(speed)

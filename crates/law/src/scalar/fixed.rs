@@ -76,7 +76,6 @@ const fn to_float(value: i32, fraction_bits: u32) -> f32 {
 
 impl Add for Fixed {
     type Output = Self;
-    #[inline(always)]
     fn add(self, other: Self) -> Self {
         Self(self.0.saturating_add(other.0))
     }
@@ -84,7 +83,6 @@ impl Add for Fixed {
 
 impl Sub for Fixed {
     type Output = Self;
-    #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Self(self.0.saturating_sub(other.0))
     }
@@ -92,7 +90,6 @@ impl Sub for Fixed {
 
 impl Neg for Fixed {
     type Output = Self;
-    #[inline(always)]
     fn neg(self) -> Self {
         Self(self.0.saturating_neg())
     }
@@ -106,13 +103,11 @@ impl FixedGain {
         }
     }
 
-    #[inline(always)]
     const fn shift(self) -> u32 {
         self.right.wrapping_add(u32::BITS + 1)
     }
 
     /// The product with a 32-bit signal, before rounding: never overflows.
-    #[inline(always)]
     const fn product(self, value: i32) -> i64 {
         value as i64 * self.mantissa as i64
     }
@@ -158,7 +153,6 @@ impl Scalar for Fixed {
         to_float(self.0, quantity.fraction_bits())
     }
 
-    #[inline(always)]
     fn to_word(self) -> u32 {
         self.0 as u32
     }
@@ -189,12 +183,10 @@ impl Scalar for Fixed {
         FixedGain::new(rounding::round(mantissa) as i32, shift as u32)
     }
 
-    #[inline(always)]
     fn scale(self, gain: FixedGain) -> Self {
         Self::scale_integer(self.0, gain)
     }
 
-    #[inline(always)]
     fn scale_integer(value: i32, gain: FixedGain) -> Self {
         gain.scaled(value)
     }
@@ -221,12 +213,10 @@ impl Scalar for Fixed {
         }
     }
 
-    #[inline(always)]
     fn round_scaled(self, gain: FixedGain) -> i32 {
         self.scale(gain).0
     }
 
-    #[inline(always)]
     fn times(self, factor: Self, factor_quantity: Quantity) -> Self {
         let left = u32::BITS - factor_quantity.fraction_bits();
         shifted_product(self.0, factor.0, left)
@@ -243,13 +233,11 @@ impl Scalar for Fixed {
         }
     }
 
-    #[inline(always)]
     fn is_within(self, most: Self) -> bool {
         // One comparison of an unsigned difference.
         self.0.wrapping_add(most.0) as u32 <= (most.0 as u32) << 1
     }
 
-    #[inline(always)]
     fn magnitude(self) -> Self {
         Self(self.0.saturating_abs())
     }
@@ -285,12 +273,10 @@ impl Scalar for Fixed {
         sum.saturating_add(term)
     }
 
-    #[inline(always)]
     fn total(sum: i64) -> Self {
         saturate(round_shift(sum, SUM_EXTRA_BITS))
     }
 
-    #[inline(always)]
     fn into_sum(self) -> i64 {
         i64::from(self.0) << SUM_EXTRA_BITS
     }

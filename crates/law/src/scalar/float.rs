@@ -25,12 +25,10 @@ macro_rules! float_scalar {
                 if value.is_nan() { 0.0 } else { value as $float }
             }
 
-            #[inline(always)]
             fn to_f32(self, _: Quantity) -> f32 {
                 self as f32
             }
 
-            #[inline(always)]
             fn to_word(self) -> u32 {
                 (self as f32).to_bits()
             }
@@ -47,12 +45,10 @@ macro_rules! float_scalar {
                 value as $float
             }
 
-            #[inline(always)]
             fn scale(self, gain: Self::Gain) -> Self {
                 self * gain
             }
 
-            #[inline(always)]
             fn scale_integer(value: i32, gain: Self::Gain) -> Self {
                 value as $float * gain
             }
@@ -77,14 +73,12 @@ macro_rules! float_scalar {
                 (high as $float * 1_048_576.0 + low as $float) * gain
             }
 
-            #[inline(always)]
             fn round_scaled(self, gain: Self::Gain) -> i32 {
                 let scaled = self * gain;
                 let half = if scaled < 0.0 { -$half } else { $half };
                 (scaled + half) as i32
             }
 
-            #[inline(always)]
             fn times(self, factor: Self, _: Quantity) -> Self {
                 self * factor
             }
@@ -100,12 +94,10 @@ macro_rules! float_scalar {
                 }
             }
 
-            #[inline(always)]
             fn is_within(self, most: Self) -> bool {
                 self.magnitude() <= most
             }
 
-            #[inline(always)]
             fn magnitude(self) -> Self {
                 // Clears the sign bit; the same on both sides, also for NaN.
                 Self::from_bits(self.to_bits() & (<$bits>::MAX >> 1))
@@ -133,7 +125,6 @@ macro_rules! float_scalar {
                 }
             }
 
-            #[inline(always)]
             fn total(sum: Self::Sum) -> Self {
                 sum.total
             }
