@@ -6,7 +6,6 @@ use quadrant_law::friction::gms::GmsElement;
 use quadrant_settings::presets::X_PLANT;
 use quadrant_settings::{AxisSettings, Reason, StageSettings};
 
-use crate::fields::nonlinear;
 use crate::whole_set::{ROOM, check_message, refusal};
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::nctf::CharacteristicPoint;
@@ -60,7 +59,13 @@ fn elements_must_fit_the_room_and_exist() {
 
 #[test]
 fn nonlinear_gain_beyond_the_popov_bound_is_refused_when_a_plant_is_given() {
-    let steep = |axis: &mut AxisSettings| nonlinear(axis).rate_per_mm = 25.0;
+    let steep = |axis: &mut AxisSettings| {
+        axis.feedback
+            .nonlinear
+            .as_mut()
+            .expect("by default")
+            .rate_per_mm = 25.0
+    };
     let (field, reason, text) = reason(steep);
     assert_eq!(field, "feedback.nonlinear.rate_per_mm");
     let Reason::BeyondPopov { bound } = reason else {
@@ -74,7 +79,13 @@ fn nonlinear_gain_beyond_the_popov_bound_is_refused_when_a_plant_is_given() {
     });
     assert_eq!(unknown.validate(ROOM), Ok(()));
     // Just within.
-    let within = with_x(|axis| nonlinear(axis).rate_per_mm = (bound * 0.999).acosh() / 0.1);
+    let within = with_x(|axis| {
+        axis.feedback
+            .nonlinear
+            .as_mut()
+            .expect("by default")
+            .rate_per_mm = (bound * 0.999).acosh() / 0.1
+    });
     assert_eq!(within.validate(ROOM), Ok(()));
 }
 

@@ -5,7 +5,6 @@ mod cross_checks;
 mod destinations;
 mod draft;
 mod fields;
-mod law_fields;
 mod leaves;
 mod paths;
 mod plan;

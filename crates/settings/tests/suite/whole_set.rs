@@ -5,16 +5,11 @@ use quadrant_law::control::pid::PidGains;
 use quadrant_law::decimal::Decimal;
 use quadrant_settings::{FeedbackSettings, PlanSettings, Reason, SettingsError, StageSettings};
 
-use crate::fields::{FIELDS, Field};
-use crate::law_fields::LAW_FIELDS;
+use crate::fields::{FIELDS, number};
 use crate::leaves::law_of;
 use quadrant_test_support::with_x;
 
 pub(crate) const ROOM: usize = 4;
-
-fn fields() -> impl Iterator<Item = &'static (&'static str, Field, f64, f64)> {
-    FIELDS.iter().chain(LAW_FIELDS)
-}
 
 pub(crate) fn refusal(settings: &StageSettings) -> SettingsError {
     settings.validate(ROOM).expect_err("refused")
@@ -44,7 +39,7 @@ pub(crate) fn check_message(error: &SettingsError, axis: AxisName, field: &str) 
 #[test]
 fn every_number_out_of_its_range_is_refused_by_name_on_every_axis() {
     for (index, name) in AxisName::ALL.into_iter().enumerate() {
-        for &(field, place, below, above) in fields() {
+        for &(field, below, above) in FIELDS {
             for value in [below, above] {
                 let mut settings = StageSettings::simulated();
                 // Below breakaway is above x's coulomb level; other axes have other levels.
@@ -53,7 +48,7 @@ fn every_number_out_of_its_range_is_refused_by_name_on_every_axis() {
                 if let Some(law) = law_of(field) {
                     settings.axes[index].feedback.law = law;
                 }
-                *place(&mut settings.axes[index]) = value;
+                *number(&mut settings, name, field) = value;
                 let error = refusal(&settings);
                 check_message(&error, name, field);
                 assert_eq!(error.value, value, "{field}");
@@ -67,9 +62,10 @@ fn every_number_out_of_its_range_is_refused_by_name_on_every_axis() {
 
 #[test]
 fn every_number_that_is_not_finite_is_refused_by_name() {
-    for &(field, place, ..) in fields() {
+    for &(field, ..) in FIELDS {
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            let settings = with_x(|axis| *place(axis) = value);
+            let mut settings = StageSettings::simulated();
+            *number(&mut settings, AxisName::X, field) = value;
             let error = refusal(&settings);
             check_message(&error, AxisName::X, field);
             assert_eq!(error.reason, Reason::NotFinite, "{field}");
@@ -94,7 +90,7 @@ fn the_list_of_fields_is_complete() {
     // One element and one point stand for all; the encoder has three whole numbers.
     assert_eq!(
         stored,
-        fields().count() + 2 * (elements - 1) + 4 * (points - 1) + 3
+        FIELDS.len() + 2 * (elements - 1) + 4 * (points - 1) + 3
     );
 }
 
