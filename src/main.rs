@@ -120,20 +120,20 @@ mod app {
         idle: Idle,
         supervision: Supervision,
         liveness: Liveness,
-        requests_in: Producer<'static, Command>,
-        requests_out: Consumer<'static, Command>,
-        commands_in: Producer<'static, Command>,
-        commands_out: Consumer<'static, Command>,
-        snapshots_in: Producer<'static, &'static mut Snapshot<Number>>,
-        snapshots_out: Consumer<'static, &'static mut Snapshot<Number>>,
-        free_snapshots_in: Producer<'static, &'static mut Snapshot<Number>>,
-        free_snapshots_out: Consumer<'static, &'static mut Snapshot<Number>>,
-        glitches_in: Producer<'static, GlitchReadings>,
-        glitches_out: Consumer<'static, GlitchReadings>,
-        events_in: Producer<'static, (u32, Event)>,
-        events_out: Consumer<'static, (u32, Event)>,
-        lines_in: Producer<'static, LogEntry<Number>>,
-        lines_out: Consumer<'static, LogEntry<Number>>,
+        requests_in: Producer<'static, Command, 4>,
+        requests_out: Consumer<'static, Command, 4>,
+        commands_in: Producer<'static, Command, 4>,
+        commands_out: Consumer<'static, Command, 4>,
+        snapshots_in: Producer<'static, &'static mut Snapshot<Number>, 4>,
+        snapshots_out: Consumer<'static, &'static mut Snapshot<Number>, 4>,
+        free_snapshots_in: Producer<'static, &'static mut Snapshot<Number>, 4>,
+        free_snapshots_out: Consumer<'static, &'static mut Snapshot<Number>, 4>,
+        glitches_in: Producer<'static, GlitchReadings, 2>,
+        glitches_out: Consumer<'static, GlitchReadings, 2>,
+        events_in: Producer<'static, (u32, Event), 16>,
+        events_out: Consumer<'static, (u32, Event), 16>,
+        lines_in: Producer<'static, LogEntry<Number>, 16>,
+        lines_out: Consumer<'static, LogEntry<Number>, 16>,
         event_logger: EventLogger,
     }
 
@@ -387,7 +387,7 @@ mod app {
     }
 
     /// Passes an entry to the log, which prints when nothing more urgent is to be done.
-    fn print(lines: &mut Producer<'static, LogEntry<Number>>, line: LogEntry<Number>) {
+    fn print(lines: &mut Producer<'static, LogEntry<Number>, 16>, line: LogEntry<Number>) {
         if lines.enqueue(line).is_err() {
             log::lose_line();
         }
