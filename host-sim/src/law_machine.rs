@@ -1,4 +1,4 @@
-//! The firmware's application on the host: control tick and supervisor in the order in which the target runs them.
+//! The law and its supervisor on the host, in the order in which the target runs them.
 
 use std::collections::VecDeque;
 

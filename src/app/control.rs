@@ -372,7 +372,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
                 if self.state.wants_voltage()
                     && let Some(value) = block.value(self.place)
                 {
-                    self.state.offer_value(value);
+                    self.state.push_injection(value);
                     self.place += 1;
                 }
                 self.place >= block.len()

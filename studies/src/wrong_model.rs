@@ -13,7 +13,7 @@ use quadrant_sim::identified_stage::identified_settings;
 use quadrant_sim::plant::StageParameters;
 use quadrant_sim::run::RunError;
 use quadrant_sim::sine_test::{SineTest, SineTestOutcome, run_sine_tests};
-use quadrant_tune::design::best::set_best_pid;
+use quadrant_tune::design::set_best_pid;
 use rand::{RngCore, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;

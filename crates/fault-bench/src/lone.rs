@@ -99,7 +99,7 @@ impl<S: Scalar> Lone<S> {
                 Err(fault) => (self.fault, self.output_v) = (Some(fault), 0.0),
             }
             if self.ticks == 1 {
-                self.axis.enable(&mut self.state);
+                self.axis.hold_here(&mut self.state);
             }
         }
         self.plant.step(self.output_v);

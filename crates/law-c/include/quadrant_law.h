@@ -37,6 +37,8 @@ typedef enum QuadrantError {
   QUADRANT_ERROR_ELEMENTS = 5,
   // A number is infinite or none.
   QUADRANT_ERROR_NOT_FINITE = 6,
+  // A gain of the PID, or `integral_limit_v`, is negative.
+  QUADRANT_ERROR_GAINS = 7,
 } QuadrantError;
 
 // An axis, made by `quadrant_axis_build`: static memory of the caller's that only these functions read and write.
@@ -59,7 +61,7 @@ typedef struct QuadrantFriction {
   double viscous_v_s_per_mm;
 } QuadrantFriction;
 
-// A block of friction before it slides: a spring, and the share of the level that it bears.
+// A block of friction before it slides: a spring, and the share of the level that it takes.
 typedef struct QuadrantElement {
   // Stiffness, V/mm.
   double stiffness_v_per_mm;
@@ -141,9 +143,9 @@ enum QuadrantError quadrant_axis_build(struct QuadrantAxis *axis,
 //
 // # Safety
 // `axis` was made by `quadrant_axis_build`, and nothing else uses it meanwhile.
-void quadrant_axis_enable(struct QuadrantAxis *axis);
+void quadrant_axis_hold_here(struct QuadrantAxis *axis);
 
-// Measured position of the axis, 1/65536 of a count: where a reference begins after `quadrant_axis_enable`.
+// Measured position of the axis, 1/65536 of a count: where a reference begins after `quadrant_axis_hold_here`.
 //
 // # Safety
 // `axis` was made by `quadrant_axis_build`, and nothing else uses it meanwhile.

@@ -9,15 +9,14 @@
 use core::mem::MaybeUninit;
 
 use quadrant_law::axis::{Axis, AxisBuilder, AxisError, AxisState, OutputStage};
-use quadrant_law::control::feedback::Feedback;
-use quadrant_law::control::pid::{Pid, PidGains};
+use quadrant_law::control::pid::PidGains;
 use quadrant_law::encoder::EncoderReading;
 use quadrant_law::feedforward::{FeedforwardGains, FeedforwardKind};
 use quadrant_law::friction::gms::{GmsElement, GmsElements, GmsParameters};
 use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant_law::friction::{FrictionSettings, PerDirection};
 use quadrant_law::reference::ReferenceSample;
-use quadrant_law::safety::monitor::{Following, Overspeed};
+use quadrant_law::safety::monitor::Following;
 use quadrant_law::units::Position;
 
 /// Most elements of an axis' friction.
@@ -58,7 +57,7 @@ pub struct QuadrantFriction {
     pub viscous_v_s_per_mm: f64,
 }
 
-/// A block of friction before it slides: a spring, and the share of the level that it bears.
+/// A block of friction before it slides: a spring, and the share of the level that it takes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct QuadrantElement {
@@ -148,6 +147,8 @@ pub enum QuadrantError {
     Elements = 5,
     /// A number is infinite or none.
     NotFinite = 6,
+    /// A gain of the PID, or `integral_limit_v`, is negative.
+    Gains = 7,
 }
 
 impl From<AxisError> for QuadrantError {
@@ -158,6 +159,7 @@ impl From<AxisError> for QuadrantError {
             AxisError::OutputLimit(_) => Self::OutputLimit,
             AxisError::Preview(_) => Self::Preview,
             AxisError::Bumpless(_) => Self::NotFinite,
+            AxisError::Gains => Self::Gains,
         }
     }
 }
@@ -259,7 +261,6 @@ impl QuadrantParameters {
         };
         let (error_mm, lag_s) = (self.following_error_mm, self.following_lag_s);
         let period_s = 1.0 / self.rate_hz;
-        let counts_per_tick = self.overspeed_mm_s * period_s / self.resolution_mm;
         AxisBuilder::new(axis, self.resolution_mm, period_s)
             .output(OutputStage {
                 limit_v: self.limit_v,
@@ -267,13 +268,9 @@ impl QuadrantParameters {
                 offset_v: self.offset_v,
                 reversed: self.reversed,
             })
-            .feedback(Feedback::Pid(Pid::build(
-                &gains,
-                self.integral_limit_v,
-                period_s,
-            )))
+            .pid(&gains, self.integral_limit_v)
             .feedforward(kind, &share, &friction, self.preview_ticks as usize)
-            .overspeed(Overspeed::new(counts_per_tick))
+            .overspeed_mm_s(self.overspeed_mm_s)
             .following(Following::new(
                 error_mm,
                 lag_s,
@@ -314,7 +311,7 @@ pub unsafe extern "C" fn quadrant_axis_build(
     let (parts, parameters) = unsafe { (parts(axis), &*parameters) };
     match parameters.build(&mut parts.axis) {
         Ok(()) => {
-            parts.axis.enable(&mut parts.state);
+            parts.axis.hold_here(&mut parts.state);
             QuadrantError::None
         }
         Err(error) => {
@@ -329,13 +326,13 @@ pub unsafe extern "C" fn quadrant_axis_build(
 /// # Safety
 /// `axis` was made by `quadrant_axis_build`, and nothing else uses it meanwhile.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn quadrant_axis_enable(axis: *mut QuadrantAxis) {
+pub unsafe extern "C" fn quadrant_axis_hold_here(axis: *mut QuadrantAxis) {
     // SAFETY: the caller's promise.
     let parts = unsafe { parts(axis) };
-    parts.axis.enable(&mut parts.state);
+    parts.axis.hold_here(&mut parts.state);
 }
 
-/// Measured position of the axis, 1/65536 of a count: where a reference begins after `quadrant_axis_enable`.
+/// Measured position of the axis, 1/65536 of a count: where a reference begins after `quadrant_axis_hold_here`.
 ///
 /// # Safety
 /// `axis` was made by `quadrant_axis_build`, and nothing else uses it meanwhile.

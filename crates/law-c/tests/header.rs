@@ -11,7 +11,7 @@ use quadrant_law::friction::FrictionSettings;
 use quadrant_law::friction::gms::GmsParameters;
 use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant_law::reference::{MotionScale, ReferenceSample};
-use quadrant_law::safety::monitor::{Following, Overspeed};
+use quadrant_law::safety::monitor::Following;
 use quadrant_law::units::Position;
 use quadrant_law_c::{
     QuadrantAxis, QuadrantError, QuadrantParameters, quadrant_axis_build, quadrant_axis_tick,
@@ -126,12 +126,12 @@ fn words() -> Vec<i16> {
         axis.output(OutputStage::limited_to(9.0))
             .pid(&gains, 2.0)
             .feedforward(FeedforwardKind::Combined, &whole, &friction, 0)
-            .overspeed(Overspeed::new(50.0))
+            .overspeed_mm_s(250.0)
             .following(Following::new(0.5, 0.02, 5.5))
     })
     .expect("valid");
     let mut state = AxisState::default();
-    axis.enable(&mut state);
+    axis.hold_here(&mut state);
     let (period, frequency) = (1e-4, 2.0);
     let (mut sine, mut mass, mut spring) = ([0.0, 5.0], [0.0, 0.0], 0.0_f64);
     (0..80_000)
@@ -220,13 +220,14 @@ fn made(change: impl FnOnce(&mut QuadrantParameters)) -> (QuadrantError, u8, i16
 fn a_refused_axis_says_why_and_puts_out_nothing() {
     assert_eq!(made(|_| ()), (QuadrantError::None, 0, 164));
     type Change = fn(&mut QuadrantParameters);
-    let refused: [(Change, QuadrantError); 7] = [
+    let refused: [(Change, QuadrantError); 8] = [
         (|of| of.resolution_mm = 0.0, QuadrantError::Resolution),
         (|of| of.rate_hz = -1.0, QuadrantError::Rate),
         (|of| of.limit_v = 11.0, QuadrantError::OutputLimit),
         (|of| of.preview_ticks = 31, QuadrantError::Preview),
         (|of| of.element_count = 9, QuadrantError::Elements),
         (|of| of.kp_v_per_mm = f64::NAN, QuadrantError::NotFinite),
+        (|of| of.ki_v_per_mm_s = -1.0, QuadrantError::Gains),
         (
             |of| of.elements[7].weight = f64::INFINITY,
             QuadrantError::NotFinite,

@@ -48,15 +48,6 @@ impl Default for EncoderReading {
     }
 }
 
-/// The motion between two readings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Step {
-    /// Counts towards larger positions.
-    pub counts: i32,
-    /// True if the axis can have moved that far.
-    pub plausible: bool,
-}
-
 /// An incremental encoder's counter.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Encoder {
@@ -114,20 +105,11 @@ impl Encoder {
         }
     }
 
-    /// Takes a raw count: differences it, wrap-safe, and accumulates. An implausible step is accumulated too, so that
-    /// position is not lost when the limit was wrong.
+    /// Takes a raw count: differences it, wrap-safe, accumulates, and returns the counts since the last reading. The first reading
+    /// is where zero is. A step that is not [plausible](Self::is_plausible) is accumulated too, so that position is not lost when
+    /// the limit was wrong.
     #[inline(always)]
-    pub fn update(&self, state: &mut EncoderState, raw: u32) -> Step {
-        let counts = self.accumulate(state, raw);
-        Step {
-            counts,
-            plausible: self.is_plausible(counts),
-        }
-    }
-
-    /// As [`update`](Self::update), without the judgement; returns the counts. The first reading is where zero is.
-    #[inline(always)]
-    pub(crate) fn accumulate(&self, state: &mut EncoderState, raw: u32) -> i32 {
+    pub fn accumulate(&self, state: &mut EncoderState, raw: u32) -> i32 {
         let counts = self.between(state.raw, raw);
         state.raw = raw;
         if !state.started {
@@ -140,7 +122,7 @@ impl Encoder {
     }
 
     /// True if the axis can have moved that far in a tick.
-    pub(crate) const fn is_plausible(&self, counts: i32) -> bool {
+    pub const fn is_plausible(&self, counts: i32) -> bool {
         // Between both ends, by one comparison.
         let largest = self.largest_step as u32;
         (counts as u32).wrapping_add(largest) <= largest.wrapping_mul(2)

@@ -254,15 +254,9 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
         self.injection.wants_value()
     }
 
-    /// Gives the injection the next value of a block; call it when [`StageState::wants_voltage`].
-    pub fn offer_value(&mut self, value: InjectedValue) {
+    /// Gives the injection its next value; call it when [`StageState::wants_voltage`].
+    pub fn push_injection(&mut self, value: InjectedValue) {
         self.injection.offer(value);
-    }
-
-    /// Gives the injection its next value, in the converter's words; call it when [`StageState::wants_voltage`]. `last`:
-    /// it ends with this one.
-    pub fn push_injection(&mut self, word: i16, last: bool) {
-        self.offer_value(InjectedValue { word, last });
     }
 
     /// True if an injection can begin.
@@ -613,7 +607,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             state.moving = None;
             state.held = None;
             for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
-                axis.enable(memory);
+                axis.hold_here(memory);
             }
         } else if state.safety.is_enabled() {
             self.start(state, command, tick);

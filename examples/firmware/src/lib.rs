@@ -11,7 +11,7 @@ use quadrant_law::friction::gms::GmsParameters;
 use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant_law::reference::{Motion, MotionScale};
 use quadrant_law::safety::FaultCode;
-use quadrant_law::safety::monitor::{Following, Overspeed};
+use quadrant_law::safety::monitor::Following;
 use quadrant_law::units::DacCode;
 
 /// An encoder count in mm, and control periods per second.
@@ -55,7 +55,7 @@ impl Servo {
             axis.output(OutputStage::limited_to(9.0))
                 .pid(&GAINS, 2.0)
                 .feedforward(FeedforwardKind::Combined, &gains, &friction, 12)
-                .overspeed(Overspeed::new(50.0))
+                .overspeed_mm_s(250.0)
                 .following(Following::new(0.5, 0.02, 2.0))
         })?;
         Ok(Self {
@@ -72,7 +72,7 @@ impl Servo {
         self.fault = self.fault.or(word.err());
         if self.fault.is_some() || !enable {
             // While it is off the axis forgets, so that it holds from where it is when it is switched on.
-            self.axis.enable(&mut self.state);
+            self.axis.hold_here(&mut self.state);
             return None;
         }
         word.ok()

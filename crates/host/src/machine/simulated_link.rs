@@ -6,7 +6,6 @@ use std::time::Duration;
 
 use quadrant_law::safety::Switches;
 use quadrant_law::supervisor::PERIOD_TICKS;
-use quadrant_lockstep::FLASH_BYTES;
 use quadrant_sim::stage_setup::StageSetup;
 
 use super::flash_file::FlashFile;
@@ -15,6 +14,9 @@ use super::memory_flash::MemoryFlash;
 use super::simulated::SimulatedMachine;
 use super::simulated_io::SimulatedIo;
 use super::timing::server_period;
+
+/// Size of the flash for settings: two sectors of 16 KiB.
+const FLASH_BYTES: usize = 2 << 14;
 
 /// The firmware's application on a simulated stage, and the bytes to and from it.
 pub struct SimulatedLink {

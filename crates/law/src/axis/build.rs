@@ -30,6 +30,7 @@ use core::fmt;
 #[derive(Debug)]
 pub struct AxisBuilder<'a, S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     axis: &'a mut Axis<S, N>,
+    resolution_mm: f64,
     period_s: f64,
     error: Option<AxisError>,
 }
@@ -43,6 +44,8 @@ pub enum AxisError {
     Period(f64),
     /// The output limit, V: not above zero, beyond the amplifier's full scale, or not given.
     OutputLimit(f64),
+    /// A gain of the PID or the limit of its integral: negative, or no finite number.
+    Gains,
     /// The preview in ticks: more than [`MAX_PREVIEW_TICKS`].
     Preview(usize),
     /// The time constant of a bumpless offset, s: not above zero.
@@ -59,6 +62,9 @@ impl fmt::Display for AxisError {
                 "an output limit of {} V is not above zero and within the amplifier's full scale",
                 Decimal(*v)
             ),
+            Self::Gains => {
+                f.write_str("a gain or the integral's limit is negative or no finite number")
+            }
             Self::Preview(ticks) => write!(
                 f,
                 "a preview of {ticks} ticks is longer than {MAX_PREVIEW_TICKS}"
@@ -110,6 +116,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.cancelling.switch_off();
         let builder = Self {
             axis,
+            resolution_mm,
             period_s,
             error: None,
         };
@@ -185,6 +192,13 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         self.axis.bumpless_decay =
             S::quantise(libm::exp(-self.period_s / time_s), Quantity::Fraction);
         self.require(is_positive(time_s), AxisError::Bumpless(time_s))
+    }
+
+    /// The measured speed above which the axis is at fault, mm/s.
+    #[must_use]
+    pub fn overspeed_mm_s(self, limit_mm_s: f64) -> Self {
+        let counts_per_tick = limit_mm_s * self.period_s / self.resolution_mm;
+        self.overspeed(Overspeed::new(counts_per_tick))
     }
 
     /// The limit of the measured speed.
@@ -334,6 +348,8 @@ impl<S: Scalar, const N: usize> AxisBuilder<'_, S, N> {
     #[must_use]
     pub fn pid(self, gains: &PidGains, integral_limit_v: f64) -> Self {
         let pid = Pid::build(gains, integral_limit_v, self.period_s);
+        let is_limit = integral_limit_v >= 0.0 && integral_limit_v < f64::INFINITY;
         self.feedback(Feedback::Pid(pid))
+            .require(gains.is_valid() && is_limit, AxisError::Gains)
     }
 }

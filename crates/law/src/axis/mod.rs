@@ -177,7 +177,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
 
     /// One control period of an axis that is driven by itself, on a reference from elsewhere: a trajectory planner of the
     /// caller's. `ahead` is where the reference will be after the preview, and its derivatives there. It begins where the axis
-    /// was [enabled](Self::enable).
+    /// was last [to hold](Self::hold_here).
     ///
     /// # Errors
     /// The fault that was found, if any. It is the caller who switches the amplifier off.
@@ -399,8 +399,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         self.standstill.step(standstill, state.speed(), begins)
     }
 
-    /// Prepares to hold the measured position.
-    pub fn enable(&self, state: &mut AxisState<S, N>) {
+    /// Prepares to hold the measured position, and forgets what went before: when the outputs are switched on, or in every tick that
+    /// they are off.
+    pub fn hold_here(&self, state: &mut AxisState<S, N>) {
         let here = state.encoder.position();
         let shown = Shown {
             speed: 0,

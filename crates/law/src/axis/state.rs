@@ -225,12 +225,6 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
         self.following
     }
 
-    /// The largest tracking error since enabling as a share of its limit at the time: above 1 after a following error.
-    /// It stays until the next enabling. For telemetry; it divides.
-    pub fn following_high_mark(&self) -> f32 {
-        self.following.high_mark()
-    }
-
     /// Declares the present count that of the machine, or not: homing does, and a board whose encoders are absolute.
     pub(crate) fn set_homed(&mut self, homed: bool) {
         if self.homed != homed {

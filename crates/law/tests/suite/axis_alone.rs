@@ -8,7 +8,7 @@ use quadrant_law::control::feedback::{Feedback, LawKind};
 use quadrant_law::control::pid::{Pid, PidGains};
 use quadrant_law::encoder::EncoderReading;
 use quadrant_law::feedforward::FeedforwardKind;
-use quadrant_law::injection::{Coupling, Injection};
+use quadrant_law::injection::{Coupling, InjectedValue, Injection};
 use quadrant_law::reference::{Motion, MotionScale, MotionState, ReferenceSample};
 use quadrant_law::safety::{AxisSwitches, FaultCode, Switches};
 use quadrant_law::stage::StageState;
@@ -248,7 +248,7 @@ fn the_largest_error_since_enabling_is_kept() {
         rig.tick();
     }
     let x = &rig.state.axes()[0];
-    let share = x.following_high_mark();
+    let share = x.following().high_mark();
     let limit = StageSettings::simulated().axes[0].limits.following_error_mm;
     assert!(
         (f64::from(share) * limit - 0.02).abs() < 1e-3,
@@ -277,14 +277,20 @@ fn word_of_pushed_axis(away: i32, injected_word: i16) -> i16 {
         1e6,
     );
     rig.state.prepare_injection(injection);
-    rig.state.push_injection(injected_word, false);
+    rig.state.push_injection(InjectedValue {
+        word: injected_word,
+        last: false,
+    });
     rig.inputs.command = Some(Command::StartInjection);
     let mut word = 0;
     for step in 0..400 {
         rig.inputs.set_counts([(away * 10 * step) as u32, 0, 0]);
         let outputs = rig.tick();
         assert!(outputs.enabled, "{:?}", rig.state.safety());
-        rig.state.push_injection(injected_word, false);
+        rig.state.push_injection(InjectedValue {
+            word: injected_word,
+            last: false,
+        });
         word = outputs.codes[0].0;
     }
     word
@@ -319,11 +325,17 @@ fn a_voltage_beyond_the_limit_is_shown_as_limited_also_in_open_loop() {
     );
     rig.command(Command::Stop);
     rig.state.prepare_injection(injection);
-    rig.state.push_injection(3000, false);
+    rig.state.push_injection(InjectedValue {
+        word: 3000,
+        last: false,
+    });
     rig.command(Command::StartInjection);
     let shown = |rig: &Rig<f32>| rig.state.axes()[0].telemetry().limited_by;
     assert_eq!(shown(&rig), LimitedBy::Nothing);
-    rig.state.push_injection(30_000, false);
+    rig.state.push_injection(InjectedValue {
+        word: 30_000,
+        last: false,
+    });
     assert!(rig.tick().enabled);
     assert_eq!(shown(&rig), LimitedBy::OutputLimit);
 }
@@ -343,7 +355,10 @@ fn settings_that_change_while_a_voltage_is_added_make_no_step() {
         100.0,
     );
     rig.state.prepare_injection(injection);
-    rig.state.push_injection(10_000, false);
+    rig.state.push_injection(InjectedValue {
+        word: 10_000,
+        last: false,
+    });
     rig.command(Command::StartInjection);
     rig.inputs.set_counts([80, 0, 0]);
     let mut codes = vec![];
@@ -353,7 +368,10 @@ fn settings_that_change_while_a_voltage_is_added_make_no_step() {
             other.axes[0].feedback.pid.kp_v_per_mm *= 3.0;
             rig.exchange(&other);
         }
-        rig.state.push_injection(10_000, false);
+        rig.state.push_injection(InjectedValue {
+            word: 10_000,
+            last: false,
+        });
         let outputs = rig.tick();
         assert!(outputs.enabled, "{:?}", rig.state.safety());
         codes.push(outputs.codes[0].0);
@@ -469,6 +487,31 @@ fn a_law_that_needs_the_velocity_of_the_reference_has_nothing_to_do_on_an_axis_t
 }
 
 #[test]
+fn a_pid_of_gains_that_cannot_be_is_refused() {
+    let build = |ki_v_per_mm_s: f64, limit_v: f64| {
+        let gains = PidGains {
+            kp_v_per_mm: 1.0,
+            ki_v_per_mm_s,
+            kd_v_s_per_mm: 0.0,
+            derivative_filter_s: 1e-4,
+        };
+        let scale = MotionScale::new(RESOLUTION_MM, 1.0 / PERIOD_S);
+        let output = OutputStage::limited_to(10.0);
+        Axis::<f32>::build(scale, |axis| axis.output(output).pid(&gains, limit_v)).err()
+    };
+    assert_eq!(build(1.0, 2.0), None);
+    assert_eq!(build(0.0, 0.0), None);
+    for (ki_v_per_mm_s, limit_v) in [
+        (-1.0, 2.0),
+        (f64::NAN, 2.0),
+        (1.0, -1.0),
+        (1.0, f64::INFINITY),
+    ] {
+        assert_eq!(build(ki_v_per_mm_s, limit_v), Some(AxisError::Gains));
+    }
+}
+
+#[test]
 fn a_reference_from_elsewhere_gives_the_words_of_the_same_motion() {
     let settings = StageSettings::simulated();
     let axis: Axis<f32> = settings.build_axis(AxisName::X);
@@ -566,7 +609,10 @@ fn an_injection_begins_only_with_its_first_value_and_on_an_axis_that_was_commiss
         rig.state
             .prepare_injection(Injection::new(axis, Coupling::Added, 1e-4, travel, 100.0));
         if with_value {
-            rig.state.push_injection(10, true);
+            rig.state.push_injection(InjectedValue {
+                word: 10,
+                last: true,
+            });
         }
         rig.command(Command::StartInjection);
         assert!(rig.state.safety().is_enabled());

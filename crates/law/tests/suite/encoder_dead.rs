@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use quadrant_law::axes::AxisName;
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::command::Command;
-use quadrant_law::injection::Injection;
+use quadrant_law::injection::{InjectedValue, Injection};
 use quadrant_law::reference::{MotionSettings, PointToPointSettings, ReferenceSample, Velocity};
 use quadrant_law::safety::FaultCode;
 use quadrant_law::safety::oscillation::{OscillationKind, OscillationReading};
@@ -223,7 +223,10 @@ impl<S: Scalar> Bench<S> {
             // Without a frequency, a constant voltage.
             let wave = if hz > 0.0 { turn.sin() } else { 1.0 };
             let word = DacCode::from_volts(volts * wave, 10.0);
-            self.rig.state.push_injection(word.0, false);
+            self.rig.state.push_injection(InjectedValue {
+                word: word.0,
+                last: false,
+            });
         }
     }
 

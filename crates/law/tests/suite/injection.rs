@@ -6,7 +6,7 @@ use quadrant_law::admission::StageView;
 use quadrant_law::admission::refusal;
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
-use quadrant_law::injection::Injection;
+use quadrant_law::injection::{InjectedValue, Injection};
 use quadrant_law::motion::MotionMode;
 use quadrant_law::reference::Velocity;
 use quadrant_law::safety::FaultCode;
@@ -69,7 +69,7 @@ impl<S: Scalar> Bench<S> {
         {
             self.sent += 1;
             let last = self.sent == self.words.len();
-            self.rig.state.push_injection(word, last);
+            self.rig.state.push_injection(InjectedValue { word, last });
         }
     }
 
@@ -314,7 +314,7 @@ proptest! {
         let mut left = words.iter();
         for (count, near, command) in readings {
             if rig.state.wants_voltage() && let Some(&word) = left.next() {
-                rig.state.push_injection(word, left.len() == 0);
+                rig.state.push_injection(InjectedValue { word, last: left.len() == 0 });
             }
             let place = &mut rig.inputs.readings[0].count;
             *place = if near { place.wrapping_add(count % 20) } else { count };

@@ -7,6 +7,7 @@ use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::injection::InjectedValue;
 use quadrant_law::learning::{LearningSettings, LearningStatus, MAX_DELAY_TICKS};
 use quadrant_law::motion::MotionMode;
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
@@ -448,7 +449,10 @@ fn opened() -> Axis<f32> {
     };
     let (injection, _) = learning().injection(&request).expect("within");
     axis.rig.state.prepare_injection(injection);
-    axis.rig.state.push_injection(0, false);
+    axis.rig.state.push_injection(InjectedValue {
+        word: 0,
+        last: false,
+    });
     axis.command(Command::StartInjection);
     hold_open(&mut axis, 20, false);
     assert_eq!(axis.rig.state.axes()[0].mode(), MotionMode::OpenLoop);
@@ -459,7 +463,10 @@ fn opened() -> Axis<f32> {
 fn hold_open(axis: &mut Axis<f32>, ticks: u32, last: bool) {
     for tick in 1..=ticks {
         if axis.rig.state.wants_voltage() {
-            axis.rig.state.push_injection(0, last && tick == ticks);
+            axis.rig.state.push_injection(InjectedValue {
+                word: 0,
+                last: last && tick == ticks,
+            });
         }
         axis.tick();
     }

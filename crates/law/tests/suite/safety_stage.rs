@@ -72,14 +72,14 @@ fn without_faults_nothing_is_found() {
         assert!(rig.tick().enabled);
     }
     // 0.1 mm of the limit at the speed of the time, 1 mm at rest.
-    let mark = rig.state.axes()[0].following_high_mark();
+    let mark = rig.state.axes()[0].following().high_mark();
     assert!((0.095..0.105).contains(&mark), "{mark}");
 }
 
 #[test]
 fn the_high_mark_outlasts_the_fault_and_ends_with_enabling() {
     let mut rig = standing(&StageSettings::simulated());
-    let mark = |rig: &Rig<f32>| rig.state.axes()[1].following_high_mark();
+    let mark = |rig: &Rig<f32>| rig.state.axes()[1].following().high_mark();
     assert!((mark(&rig) - 0.1).abs() < 1e-3, "{}", mark(&rig));
     while rig.state.safety().is_enabled() {
         push(&mut rig, AxisName::Y, 10);

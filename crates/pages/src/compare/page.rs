@@ -2,7 +2,7 @@
 
 use quadrant_report::{Block, Cell, Column, Figure, Page, Provenance, Section, Style, Table};
 use quadrant_sim::metrics::{GLITCH_WINDOW, Metric, change_percent};
-use quadrant_tune::design::best::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK};
+use quadrant_tune::design::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK};
 
 use crate::circle::CircleOutcome;
 use crate::circle::single_page::{circle_figures, circle_table, polar_figure};

@@ -3,7 +3,7 @@
 use quadrant_law::control::pid::PidGains;
 use quadrant_report::{Block, Cell, Colour, Page, Provenance, Section, Style, Table};
 use quadrant_sim::margins::{MarginError, Margins};
-use quadrant_tune::design::process::AnyLoop;
+use quadrant_tune::design::AnyLoop;
 use quadrant_tune::design::step_response::{StepProperties, StepResponse};
 
 use crate::design::loop_figures::{

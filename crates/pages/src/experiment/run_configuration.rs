@@ -14,7 +14,7 @@ use quadrant_law::friction::stribeck::StaticFriction;
 use quadrant_settings::StageSettings;
 use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_tune::design::DesignError;
-use quadrant_tune::design::best::{set_best_pid, with_best_pid};
+use quadrant_tune::design::{set_best_pid, with_best_pid};
 use quadrant_tune::identify::single_state::with_all_models;
 
 use crate::experiment::configuration::{Configuration, Gains};

@@ -19,7 +19,7 @@ use quadrant_sim::plant::{
     AxisParameters, Drive, FrictionParameters, Imperfections, SimulatedStage, StageParameters,
 };
 use quadrant_sim::run::{ELEMENTS, RunError, run};
-use quadrant_tune::design::best::set_best_pid;
+use quadrant_tune::design::set_best_pid;
 use quadrant_tune::design::{DesignError, Form, Process, ShapingError, shape_to_margins};
 use quadrant_tune::identify::single_state::with_all_models;
 use quadrant_tune::record::{AxisLimits, Record};

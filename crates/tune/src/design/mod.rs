@@ -5,25 +5,27 @@
 //! The *nonlinear* gain that a design then allows is [`quadrant_settings::popov::sector_bound`]'s answer.
 
 mod bandwidth;
-pub mod best;
+mod best;
 mod form;
-pub mod integral_gain;
+mod integral_gain;
 pub mod measured;
-pub mod modal;
+mod modal;
 mod noise;
 pub mod npid;
-pub mod pid;
-pub mod process;
+mod pid;
+mod process;
 pub mod robustness;
 mod search;
-pub mod shaping;
+mod shaping;
 pub mod step_response;
 pub mod time_varying;
 
 #[cfg(test)]
 mod time_domain;
 
-pub use best::{best_pid, load_step_error};
+pub use best::{
+    COMPLEMENTARY_PEAK, SENSITIVITY_PEAK, best_pid, load_step_error, set_best_pid, with_best_pid,
+};
 pub use form::Form;
 pub use integral_gain::{
     Printed, PrintedMargins, largest_integral_gain, largest_integral_gain_where,
@@ -31,7 +33,7 @@ pub use integral_gain::{
 pub use modal::{ModalDesign, modal_pid};
 pub use noise::noise_voltage_v;
 pub use pid::{DesignError, INTEGRAL_SHARE, PidDesign, PidRequest, Target, design_pid};
-pub use process::Process;
+pub use process::{AnyLoop, Process};
 pub use shaping::{ShapingError, shape_to_crossover, shape_to_margins};
 
 #[cfg(test)]

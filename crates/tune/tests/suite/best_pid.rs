@@ -3,7 +3,7 @@
 use cmaes::{CMAESOptions, DVector};
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::control::plant_model::PlantModel;
-use quadrant_tune::design::best::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK};
+use quadrant_tune::design::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK};
 use quadrant_tune::design::{Form, Process, best_pid, load_step_error};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
