@@ -5,7 +5,6 @@
 //! its one-pulse mode stops it behind the last one. The processor fills the table of bytes, arms the streams and starts
 //! the timer.
 
-use core::cell::UnsafeCell;
 use core::sync::atomic::{Ordering, fence};
 
 use quadrant::drivers::ad5754r::Sequencer;
@@ -18,6 +17,7 @@ use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
 use super::CORE_HZ;
 use super::bus_times::{READING, TIMER_HZ, WRITING};
+use super::dma_memory::DmaMemory;
 use super::pins::{LOAD, SYNC};
 
 const _: () = assert!(TIMER_HZ == CORE_HZ);
@@ -51,38 +51,11 @@ const CLEAR_RECEIVER: u32 = 0b11_1101 << 22;
 /// Largest number of polls of what was started before giving up: the longest takes some 2100 cycles, a look nine at least.
 const PATIENCE: u32 = 300;
 
-/// Memory that a DMA stream reads or writes by itself.
-struct Shared<T, const N: usize>(UnsafeCell<[T; N]>);
-
-// SAFETY: `ConverterBus` exists once, as it owns the SPI, and only it touches these, with volatile accesses, while the streams
-// are off.
-unsafe impl<T, const N: usize> Sync for Shared<T, N> {}
-
 /// Words for the set/reset register of port B, in RAM: flash cannot be read while it is erased.
-static PIN_WORDS: Shared<u32, MAX_STEPS> = Shared(UnsafeCell::new([0; MAX_STEPS]));
+static PIN_WORDS: DmaMemory<u32, MAX_STEPS> = DmaMemory::new([0; MAX_STEPS]);
 /// Bytes to send, zero where the chip does not receive them.
-static TO_SEND: Shared<u8, MAX_STEPS> = Shared(UnsafeCell::new([0; MAX_STEPS]));
-static RECEIVED: Shared<u8, MAX_STEPS> = Shared(UnsafeCell::new([0; MAX_STEPS]));
-
-impl<T: Copy, const N: usize> Shared<T, N> {
-    fn address(&self) -> u32 {
-        self.0.get() as u32
-    }
-
-    fn place(&self, index: usize) -> *mut T {
-        debug_assert!(index < N);
-        self.0.get().cast::<T>().wrapping_add(index)
-    }
-
-    /// Writes items from a place on.
-    #[inline(always)]
-    fn write<const COUNT: usize>(&self, first: usize, items: [T; COUNT]) {
-        for (index, item) in (first..).zip(items) {
-            // SAFETY: one of the items, which are static.
-            unsafe { self.place(index).write_volatile(item) };
-        }
-    }
-}
+static TO_SEND: DmaMemory<u8, MAX_STEPS> = DmaMemory::new([0; MAX_STEPS]);
+static RECEIVED: DmaMemory<u8, MAX_STEPS> = DmaMemory::new([0; MAX_STEPS]);
 
 /// The bus did not do its work in time: it is not clocked, or was switched off.
 #[derive(Clone, Copy, Debug)]
@@ -272,10 +245,7 @@ impl Sequencer for ConverterBus {
         }
         // What was received is read after the counter.
         fence(Ordering::Acquire);
-        Ok([0, 1, 2].map(|index| {
-            // SAFETY: one of the items, which are static.
-            unsafe { RECEIVED.place(index).read_volatile() }
-        }))
+        Ok([0, 1, 2].map(|index| RECEIVED.read(index)))
     }
 }
 

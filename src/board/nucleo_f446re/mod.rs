@@ -33,6 +33,7 @@ mod bus_times;
 #[cfg(not(feature = "output-on-chip"))]
 mod converter_bus;
 pub(crate) mod device;
+mod dma_memory;
 mod encoders;
 mod flash;
 mod pins;

@@ -3,7 +3,6 @@
 //! Received bytes go round in a ring of 1 KiB, 11 ms long; what is sent is copied once and goes out while the processor
 //! does something else. There are no interrupts: nothing here can delay the control tick but a few bus cycles.
 
-use core::cell::UnsafeCell;
 use core::sync::atomic::{Ordering, fence};
 
 use quadrant::drivers::dma_ring::DmaRing;
@@ -11,6 +10,8 @@ use quadrant::hal;
 use stm32f4xx_hal::gpio::{PA2, PA3, Pull};
 use stm32f4xx_hal::pac::{DMA1, USART2};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
+
+use super::dma_memory::DmaMemory;
 
 /// Bits per second. With 45 MHz divided by 49 it is 0.35 % less.
 const BAUD: u32 = 921_600;
@@ -29,26 +30,8 @@ const CLEAR_SENT: u16 = !(1 << 6);
 /// DMA_HIFCR: all five flags of stream 6 (CTCIF6 to CFEIF6).
 const CLEAR_SENDER: u32 = 0b11_1101 << 16;
 
-/// Memory that a DMA stream reads or writes by itself.
-struct Shared<const N: usize>(UnsafeCell<[u8; N]>);
-
-// SAFETY: `Serial` exists once, as it owns the peripherals, and only it touches these; what the streams do to them at the
-// same time is met with volatile accesses.
-unsafe impl<const N: usize> Sync for Shared<N> {}
-
-static RECEIVED: Shared<RING> = Shared(UnsafeCell::new([0; RING]));
-static TO_SEND: Shared<SENDING> = Shared(UnsafeCell::new([0; SENDING]));
-
-impl<const N: usize> Shared<N> {
-    fn address(&self) -> u32 {
-        self.0.get() as u32
-    }
-
-    fn byte(&self, index: usize) -> *mut u8 {
-        debug_assert!(index < N);
-        self.0.get().cast::<u8>().wrapping_add(index)
-    }
-}
+static RECEIVED: DmaMemory<u8, RING> = DmaMemory::new([0; RING]);
+static TO_SEND: DmaMemory<u8, SENDING> = DmaMemory::new([0; SENDING]);
 
 /// The serial port.
 pub(crate) struct Serial {
@@ -109,11 +92,8 @@ impl hal::Serial for Serial {
         let remaining = self.dma.st(RECEIVER).ndtr().read().ndt().bits();
         // What the counter says was written is read after the counter.
         fence(Ordering::Acquire);
-        let byte = |index| {
-            // SAFETY: the index is one of the ring, which is static; the stream writes it, hence volatile.
-            unsafe { RECEIVED.byte(index).read_volatile() }
-        };
-        self.ring.read(remaining.into(), byte, into)
+        self.ring
+            .read(remaining.into(), |index| RECEIVED.read(index), into)
     }
 
     fn write(&mut self, bytes: &[u8]) -> usize {
@@ -123,10 +103,8 @@ impl hal::Serial for Serial {
             return 0;
         }
         let count = bytes.len().min(SENDING);
-        for (index, byte) in bytes.iter().take(SENDING).enumerate() {
-            // SAFETY: the index is below the length; the stream, which reads this memory, is off.
-            unsafe { TO_SEND.byte(index).write_volatile(*byte) };
-        }
+        // The stream, which reads this memory, is off.
+        TO_SEND.write(0, bytes.iter().copied().take(SENDING));
         fence(Ordering::Release);
         // SAFETY: ones clear these flags, zeros leave the other streams' alone.
         self.dma.hifcr().write(|w| unsafe { w.bits(CLEAR_SENDER) });
