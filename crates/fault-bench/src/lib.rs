@@ -10,8 +10,10 @@
 #![forbid(unsafe_code)]
 #![allow(missing_docs)]
 
+#[cfg(feature = "tasks")]
 pub mod flash;
 pub mod lone;
 pub mod noise;
 pub mod plant;
+#[cfg(feature = "tasks")]
 pub mod tasks;
