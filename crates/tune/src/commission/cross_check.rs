@@ -28,7 +28,13 @@ pub struct CrossCheck {
 
 /// Lowest frequencies of the excitation, Hz, each with its RMS over the friction at breakaway: one after the other, until the axis stays
 /// within its bounds of way and velocity. With the first it slides most of the time.
-const EXCITATIONS: [(f64, f64); 4] = [(4.0, 2.6), (10.0, 2.6), (25.0, 2.0), (60.0, 1.5)];
+const EXCITATIONS: [(f64, f64); 5] = [
+    (4.0, 2.6),
+    (10.0, 2.6),
+    (25.0, 2.0),
+    (60.0, 1.5),
+    (25.0, 1.1),
+];
 /// Highest frequency of the excitation, Hz.
 const HIGHEST_HZ: f64 = 400.0;
 /// Period of the excitation, s.

@@ -4,6 +4,7 @@
 
 mod best_pid;
 mod commission_any_axis;
+mod cross_check;
 mod default_gains;
 mod design_npid;
 mod design_pid;
