@@ -27,13 +27,11 @@
 #![forbid(unsafe_code)]
 
 mod decimate;
-mod dots;
 mod drawing;
 mod error;
 mod figure;
 mod html;
 mod lines;
-mod mark;
 mod number;
 mod page;
 mod palette;
@@ -47,10 +45,9 @@ mod wrap;
 mod write;
 
 pub use decimate::decimate;
-pub use dots::{DotSeries, Dots, Spread};
 pub use error::ReportError;
 pub use figure::{Figure, Plot};
-pub use lines::{Band, Lines, Series};
+pub use lines::{Lines, Series};
 pub use page::{Block, Page, Provenance, Section};
 pub use palette::Colour;
 pub use polar::{DeviationTrace, Magnification, PolarDeviation};

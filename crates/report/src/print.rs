@@ -7,14 +7,13 @@ use plotters::coord::Shift;
 use plotters::coord::combinators::LogCoord;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::coord::types::RangedCoordf64;
-use plotters::element::{Circle, DashedPathElement, EmptyElement, PathElement, Polygon, Text};
+use plotters::element::{Circle, DashedPathElement, EmptyElement, PathElement, Text};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use quadrant_written::fixed;
 
 use super::drawing::{Axis, Curve, Drawing, Shape};
-use super::mark::Mark;
-use super::{Figure, Plot, ReportError};
+use super::{Figure, ReportError};
 
 /// Width of an image, px: at 96 px to the inch that of a printed page's text.
 const WIDTH: f64 = 680.0;
@@ -51,11 +50,7 @@ impl Figure {
     fn print(&self) -> Result<(String, f64), ReportError> {
         self.check()?;
         let drawing = self.decimated(POINTS).drawing();
-        let height = match &self.plot {
-            Plot::Dots(dots) => 21.0 * dots.rows().max(2.0) + 60.0,
-            _ if drawing.equal => 650.0,
-            _ => 370.0,
-        };
+        let height = if drawing.equal { 650.0 } else { 370.0 };
         draw(&drawing, height).map_err(ReportError::image)
     }
 }
@@ -189,21 +184,11 @@ fn ends(axis: &Axis, values: impl Iterator<Item = f64>) -> (f64, f64) {
 
 fn draw_chart(area: &Area<'_>, drawing: &Drawing, height: f64) -> Result<(), Box<dyn Error>> {
     let abscissas = drawing.curves.iter().flat_map(|curve| &curve.x).copied();
-    let ordinates = drawing.curves.iter().flat_map(|curve| {
-        let upper: &[f64] = match &curve.shape {
-            Shape::Band { high } => high,
-            _ => &[],
-        };
-        curve.y.iter().chain(upper).copied()
-    });
+    let ordinates = drawing.curves.iter().flat_map(|curve| &curve.y).copied();
     let mut x = ends(&drawing.x, abscissas);
     let mut y = ends(&drawing.y, ordinates);
-    let names = drawing
-        .y
-        .ticks
-        .iter()
-        .flat_map(|(_, name)| name.split('\n'));
-    let widest = names.map(|line| line.chars().count()).fold(6, usize::max);
+    let names = drawing.y.ticks.iter();
+    let widest = names.map(|(_, name)| name.chars().count()).fold(6, usize::max);
     let (left, right, below) = (CHARACTER * widest as f64 + 26.0, 16.0, 46.0);
     if drawing.equal {
         let size = (WIDTH - left - right - 4.0, height - below - 6.0);
@@ -233,15 +218,7 @@ fn draw_axes(chart: &mut Chart<'_, '_>, drawing: &Drawing) -> Result<(), Box<dyn
     let (x, y) = (chart.x_range(), chart.y_range());
     let (x_span, y_span) = (x.end - x.start, y.end - y.start);
     let x_name = |value: &f64| label(&drawing.x, *value, x_span);
-    // The library writes one line.
-    let y_name = |value: &f64| {
-        let name = label(&drawing.y, *value, y_span);
-        if name.contains('\n') {
-            String::new()
-        } else {
-            name
-        }
-    };
+    let y_name = |value: &f64| label(&drawing.y, *value, y_span);
     let mut mesh = chart.configure_mesh();
     mesh.bold_line_style(GRID.stroke_width(STEPS as u32))
         .light_line_style(TRANSPARENT)
@@ -262,22 +239,6 @@ fn draw_axes(chart: &mut Chart<'_, '_>, drawing: &Drawing) -> Result<(), Box<dyn
         mesh.disable_y_mesh();
     }
     mesh.draw()?;
-    for (at, name) in drawing
-        .y
-        .ticks
-        .iter()
-        .filter(|(_, name)| name.contains('\n'))
-    {
-        let lines: Vec<&str> = name.split('\n').collect();
-        for (i, line) in lines.iter().enumerate() {
-            let down = 13.0 * (i as f64 - (lines.len() as f64 - 1.0) / 2.0);
-            let style = text_style(11.0, HPos::Right, VPos::Center);
-            let text = Text::new((*line).to_owned(), (steps(-8.0), steps(down)), style);
-            chart
-                .plotting_area()
-                .draw(&(EmptyElement::at((x.start, *at)) + text))?;
-        }
-    }
     let rule = RULE.stroke_width(STEPS as u32);
     if drawing.y.zero && !drawing.y.log && y.contains(&0.0) {
         chart.draw_series([PathElement::new([(x.start, 0.0), (x.end, 0.0)], rule)])?;
@@ -356,54 +317,14 @@ fn draw_curve(chart: &Chart<'_, '_>, curve: &Curve) -> Result<(), Box<dyn Error>
                 let path: Vec<(f64, f64)> = run.into_iter().map(at).collect();
                 area.draw(&DashedPathElement::new(path, dash, gap, line_style(colour)))?;
             }
-            Shape::Band { high } => {
-                let upper = run.iter().rev().map(|&i| (curve.x[i], high[i]));
-                let outline: Vec<(f64, f64)> = run.iter().map(|&i| at(i)).chain(upper).collect();
-                area.draw(&Polygon::new(outline, colour.mix(0.22).filled()))?;
-            }
             Shape::Points { .. } => {
                 for i in run {
                     area.draw(&Circle::new(at(i), steps(2.4), colour.filled()))?;
                 }
             }
-            Shape::Spread {
-                index, low, high, ..
-            } => {
-                for i in run {
-                    let (_, y) = at(i);
-                    area.draw(&PathElement::new(
-                        [(low[i], y), (high[i], y)],
-                        line_style(colour),
-                    ))?;
-                    for end in [low[i], high[i]] {
-                        let cap = PathElement::new(
-                            [(0, steps(-3.0)), (0, steps(3.0))],
-                            line_style(colour),
-                        );
-                        area.draw(&(EmptyElement::at((end, y)) + cap))?;
-                    }
-                    area.draw(&(EmptyElement::at(at(i)) + outline(*index, (0, 0), colour)))?;
-                }
-            }
         }
     }
     Ok(())
-}
-
-/// Returns the mark of a series about a place of the image.
-fn outline(index: usize, (x, y): (i32, i32), colour: RGBColor) -> Polygon<(i32, i32)> {
-    let round = || (0..24).map(|i| (f64::from(i) * 0.2618).sin_cos()).collect();
-    let corners = Mark::nth(index).corners();
-    let corners: Vec<(f64, f64)> = if corners.is_empty() {
-        round()
-    } else {
-        corners.to_vec()
-    };
-    let place = |(dx, dy): (f64, f64)| (x + steps(4.0 * dx), y + steps(4.0 * dy));
-    Polygon::new(
-        corners.into_iter().map(place).collect::<Vec<_>>(),
-        colour.filled(),
-    )
 }
 
 /// Left end and middle of each entry of the legend, px, in as many lines as it takes.
@@ -441,18 +362,11 @@ fn draw_entry(area: &Area<'_>, curve: &Curve, x: f64, y: f64) -> Result<(), Box<
                 line_style(colour),
             ))?;
         }
-        Shape::Band { .. } => {
-            let corners = [(from.0, from.1 - steps(5.0)), (to.0, to.1 + steps(5.0))];
-            area.draw(&Rectangle::new(corners, colour.mix(0.22).filled()))?;
-        }
         Shape::Points { .. } => area.draw(&Circle::new(
             (steps(x + 13.0), steps(y)),
             steps(2.4),
             colour.filled(),
         ))?,
-        Shape::Spread { index, .. } => {
-            area.draw(&outline(*index, (steps(x + 13.0), steps(y)), colour))?
-        }
     }
     let style = text_style(12.0, HPos::Left, VPos::Center);
     area.draw(&Text::new(
