@@ -13,5 +13,9 @@ pub(super) fn one<S: Serializer>(value: &f64, to: S) -> Result<S::Ok, S::Error> 
 
 /// The same for many: a sample that is not finite is `null`, a gap.
 pub(super) fn list<S: Serializer>(values: &[f64], to: S) -> Result<S::Ok, S::Error> {
-    to.collect_seq(values.iter().map(|value| value.is_finite().then_some(value)))
+    to.collect_seq(
+        values
+            .iter()
+            .map(|value| value.is_finite().then_some(value)),
+    )
 }

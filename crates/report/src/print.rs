@@ -188,7 +188,9 @@ fn draw_chart(area: &Area<'_>, drawing: &Drawing, height: f64) -> Result<(), Box
     let mut x = ends(&drawing.x, abscissas);
     let mut y = ends(&drawing.y, ordinates);
     let names = drawing.y.ticks.iter();
-    let widest = names.map(|(_, name)| name.chars().count()).fold(6, usize::max);
+    let widest = names
+        .map(|(_, name)| name.chars().count())
+        .fold(6, usize::max);
     let (left, right, below) = (CHARACTER * widest as f64 + 26.0, 16.0, 46.0);
     if drawing.equal {
         let size = (WIDTH - left - right - 4.0, height - below - 6.0);

@@ -75,10 +75,7 @@ fn numbers_that_json_has_not_survive() {
 fn figures_data_are_tidy_csv_with_units_and_gaps() {
     let csv = response().to_csv().unwrap();
     let mut rows = csv.lines();
-    assert_eq!(
-        rows.next().unwrap(),
-        "series,frequency (Hz),gain (um/V)"
-    );
+    assert_eq!(rows.next().unwrap(), "series,frequency (Hz),gain (um/V)");
     assert_eq!(rows.clone().count(), 2 * 300);
     assert!(rows.next().unwrap().starts_with("Points & co.,1,0.99"));
     let gap = csv.lines().filter(|line| line.ends_with(',')).count();
@@ -173,7 +170,13 @@ fn images_are_well_formed_and_say_everything_in_text() {
                 "+4 µm",
                 "\u{2212}4 µm",
             ],
-            _ => &["frequency (Hz)", "gain (µm/V)", "Points &amp; co.", "100", "0.1"],
+            _ => &[
+                "frequency (Hz)",
+                "gain (µm/V)",
+                "Points &amp; co.",
+                "100",
+                "0.1",
+            ],
         };
         for label in labels {
             assert!(

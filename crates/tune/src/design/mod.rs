@@ -25,9 +25,7 @@ mod time_domain;
 
 pub use best::{best_pid, load_step_error};
 pub use form::Form;
-pub use integral_gain::{
-    Printed, PrintedMargins, largest_integral_gain, largest_integral_gain_where,
-};
+pub use integral_gain::largest_integral_gain_where;
 pub use modal::{ModalDesign, modal_pid};
 pub use noise::noise_voltage_v;
 pub use pid::{DesignError, INTEGRAL_SHARE, PidDesign, PidRequest, Target, design_pid};

@@ -16,6 +16,7 @@ mod identify_revise;
 mod identify_static_friction;
 mod identify_virgin_curve;
 mod npid_lasting_error;
+mod printed_margins;
 mod record_emps;
 mod record_experiment;
 mod record_refusals;
