@@ -49,12 +49,6 @@ pub enum ReportError {
         /// The radius given.
         radius_mm: f64,
     },
-    /// An image that cannot be drawn.
-    #[error("the image cannot be drawn: {reason}")]
-    Image {
-        /// Reason.
-        reason: String,
-    },
     /// The file could not be written.
     #[error("cannot write {}", path.display())]
     Write {
@@ -63,12 +57,4 @@ pub enum ReportError {
         /// Cause.
         source: std::io::Error,
     },
-}
-
-impl ReportError {
-    pub(super) fn image(reason: impl std::fmt::Display) -> Self {
-        Self::Image {
-            reason: reason.to_string(),
-        }
-    }
 }
