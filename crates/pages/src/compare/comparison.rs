@@ -47,9 +47,7 @@ impl Entry {
 pub struct Request<'a> {
     /// The stages, each with the settings of its law.
     pub setups: &'a [RunConfiguration],
-    /// The configurations.
     pub configurations: &'a [Configuration],
-    /// The sines.
     pub sines: Vec<Sines>,
     /// The first seed of the noise; the others follow it.
     pub seed: u64,

@@ -20,9 +20,6 @@ pub mod shaping;
 pub mod step_response;
 pub mod time_varying;
 
-#[cfg(test)]
-mod time_domain;
-
 pub use best::{best_pid, load_step_error};
 pub use form::Form;
 pub use integral_gain::largest_integral_gain_where;

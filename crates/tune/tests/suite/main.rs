@@ -7,6 +7,7 @@ mod commission_any_axis;
 mod default_gains;
 mod design_npid;
 mod design_pid;
+mod design_time_domain;
 mod identify_frf;
 mod identify_motion;
 mod identify_motor_constant;
