@@ -20,15 +20,6 @@ pub struct SineTest {
     pub velocity_mm_s: f64,
 }
 
-/// Result of a sine test.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SineTestOutcome {
-    /// Tracking error and glitch.
-    pub score: Score,
-    /// RMS of the output's change from tick to tick, V: chatter.
-    pub chatter_v: f64,
-}
-
 /// Cycles at full speed.
 const CYCLES: f64 = 2.25;
 /// Whole cycles at the end that are scored.
@@ -61,7 +52,7 @@ impl SineTest {
     }
 }
 
-/// Runs three settings of one axis, each on its sine, side by side; f32, as on the target. `seed` decides the noise.
+/// Runs three settings of one axis, each on its sine, side by side, for tracking error and glitch; f32, as on the target. `seed` decides the noise.
 ///
 /// # Errors
 /// Refused settings or a fault.
@@ -71,7 +62,7 @@ pub fn run_sine_tests(
     tests: [SineTest; 3],
     rate_hz: f64,
     seed: u64,
-) -> Result<[SineTestOutcome; 3], RunError> {
+) -> Result<[Score; 3], RunError> {
     let resolution_mm = settings.each_ref().map(|axis| axis.encoder.resolution_mm);
     let job = Job {
         stage: StageSettings {
@@ -104,13 +95,6 @@ pub fn run_sine_tests(
         let cycle = samples(cycle_s);
         let end = samples(LEAD_S) + samples(CYCLES * cycle_s);
         let scored = trace.slice(end - SCORED_CYCLES * cycle..end);
-        let changes = scored
-            .output_v
-            .windows(2)
-            .map(|pair| (pair[1] - pair[0]).powi(2));
-        SineTestOutcome {
-            score: score(&scored.reference_mm, &scored.error_mm, cycle),
-            chatter_v: (changes.sum::<f64>() / scored.output_v.len() as f64).sqrt(),
-        }
+        score(&scored.reference_mm, &scored.error_mm, cycle)
     }))
 }

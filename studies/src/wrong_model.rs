@@ -10,9 +10,10 @@ use quadrant_pages::parts::{UM_PER_MM, columns};
 use quadrant_report::{Block, Cell, Column, Section, Table};
 use quadrant_settings::AxisSettings;
 use quadrant_sim::identified_stage::identified_settings;
+use quadrant_sim::metrics::Score;
 use quadrant_sim::plant::StageParameters;
 use quadrant_sim::run::RunError;
-use quadrant_sim::sine_test::{SineTest, SineTestOutcome, run_sine_tests};
+use quadrant_sim::sine_test::{SineTest, run_sine_tests};
 use quadrant_tune::design::set_best_pid;
 use rand::{RngCore, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -144,19 +145,19 @@ impl Study for WrongModel {
     }
 }
 
-type Outcomes = Vec<(Wrong, [SineTestOutcome; 3])>;
+type Outcomes = Vec<(Wrong, [Score; 3])>;
 
 /// A measure, in mm.
-type Measure = (&'static str, fn(&SineTestOutcome) -> f64);
+type Measure = (&'static str, fn(&Score) -> f64);
 
 const MEASURES: [Measure; 2] = [
-    ("largest error", |outcome| outcome.score.largest_mm),
-    ("RMS error", |outcome| outcome.score.rms_mm),
+    ("largest error", |score| score.largest_mm),
+    ("RMS error", |score| score.rms_mm),
 ];
 
 /// A measure in the cases that fit, mean over the sines, um.
 fn errors_um(outcomes: &Outcomes, read: Measure, fits: impl Fn(Wrong) -> bool) -> Vec<f64> {
-    let mean = |sines: &[SineTestOutcome; 3]| sines.iter().map(read.1).sum::<f64>() / 3.0;
+    let mean = |sines: &[Score; 3]| sines.iter().map(read.1).sum::<f64>() / 3.0;
     outcomes
         .iter()
         .filter(|(wrong, _)| fits(*wrong))

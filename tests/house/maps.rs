@@ -3,27 +3,23 @@
 use std::collections::BTreeSet;
 
 use crate::assert_none;
-use crate::lexer::{Kind, tokens};
+use crate::source::{code, doc_comments};
 use crate::tree::sources;
 
 /// Public modules that a source declares in files of their own.
 fn public_modules(source: &str) -> BTreeSet<String> {
-    let all: Vec<_> = tokens(source)
-        .into_iter()
-        .filter(|token| !matches!(token.kind, Kind::OuterDoc | Kind::InnerDoc))
-        .collect();
-    all.windows(4)
-        .filter(|now| now[0].is_word("pub") && now[1].is_word("mod") && now[3].is_sign(";"))
-        .map(|now| now[2].text.to_owned())
+    code(source)
+        .filter_map(|line| line.trim().strip_prefix("pub mod ")?.strip_suffix(';'))
+        .map(str::to_owned)
         .collect()
 }
 
 /// The names that a source's own page links to, and the first segments of their paths.
 fn linked(source: &str) -> BTreeSet<String> {
-    tokens(source)
+    doc_comments(source)
         .iter()
-        .filter(|token| token.kind == Kind::InnerDoc)
-        .flat_map(|token| token.text.split("[`").skip(1))
+        .filter(|(_, _, inner)| *inner)
+        .flat_map(|(_, text, _)| text.split("[`").skip(1))
         .filter_map(|rest| rest.split('`').next())
         .map(|name| name.trim_start_matches("mod@"))
         .filter_map(|name| Some(name.split("::").next()?.to_owned()))

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
 use crate::assert_none;
-use crate::lexer::{Kind, tokens};
 use crate::pages::{Text, texts};
+use crate::source::{code, literals, variants, words};
 use crate::tree::{files, kebab_case, root, sources};
 
 /// Folders at the root whose contents documentation names.
@@ -49,26 +49,17 @@ const FOREIGN: [&str; 13] = [
 /// Every word in code and in its literals, parts of kebab-case names included whole; and every identifier in kebab case.
 pub(crate) fn words_of_code(sources: &BTreeMap<String, String>) -> BTreeSet<String> {
     let mut found = BTreeSet::new();
-    for token in sources.values().flat_map(|source| tokens(source)) {
-        match token.kind {
-            Kind::Word => {
-                found.insert(token.text.to_owned());
-                if token.text.starts_with(char::is_uppercase) {
-                    found.insert(kebab_case(token.text));
-                }
-            }
-            Kind::Literal => found.extend(split(token.text)),
-            _ => {}
+    for word in sources
+        .values()
+        .flat_map(|source| code(source))
+        .flat_map(words)
+    {
+        if word.starts_with(char::is_uppercase) {
+            found.insert(kebab_case(&word));
         }
+        found.insert(word);
     }
     found
-}
-
-/// Words of a text, in which `-` and `_` join.
-fn split(text: &str) -> impl Iterator<Item = String> {
-    text.split(|c: char| !c.is_alphanumeric() && c != '_' && c != '-')
-        .filter(|word| !word.is_empty())
-        .map(str::to_owned)
 }
 
 /// Words of code and of manifests.
@@ -77,7 +68,7 @@ fn known_words() -> BTreeSet<String> {
     let others = files(&["toml", "x", "json", "csv", "ngc", "txt"]);
     // Of recordings the head is enough.
     for text in others.values() {
-        known.extend(text.lines().take(2000).flat_map(split));
+        known.extend(text.lines().take(2000).flat_map(words));
     }
     known.extend(FOREIGN.map(str::to_owned));
     known
@@ -229,39 +220,14 @@ fn settings_paths_are_recognised() {
     assert_eq!(known("x.error"), None);
 }
 
-/// The names of an enum: its variants in kebab case, and the names that its file gives as literals.
+/// The names of an enum: its variants in kebab case, and the words that its file gives as literals.
 fn names_of(name: &str) -> (Vec<String>, BTreeSet<String>) {
-    for source in sources().values() {
-        let all: Vec<_> = tokens(source)
-            .into_iter()
-            .filter(|token| !matches!(token.kind, Kind::OuterDoc | Kind::InnerDoc))
-            .collect();
-        let Some(at) = all
-            .windows(3)
-            .position(|now| now[0].is_word("enum") && now[1].is_word(name) && now[2].is_sign("{"))
-        else {
-            continue;
-        };
-        let literals = all
-            .iter()
-            .filter(|token| token.kind == Kind::Literal)
-            .flat_map(|token| split(token.text));
-        let mut variants = Vec::new();
-        // Within the parentheses of an attribute or of a variant there is none.
-        let mut depth = 0;
-        for now in all[at + 2..].windows(2) {
-            depth += i32::from(now[0].is_sign("(")) - i32::from(now[0].is_sign(")"));
-            if now[0].is_sign("}") || now[1].is_sign("}") {
-                break;
-            }
-            let starts = [",", "{", "]"].iter().any(|sign| now[0].is_sign(sign));
-            if starts && depth == 0 && now[1].kind == Kind::Word {
-                variants.push(kebab_case(now[1].text));
-            }
-        }
-        return (variants, literals.collect());
-    }
-    panic!("no enum {name}");
+    let head = format!("enum {name} {{");
+    let sources = sources();
+    let source = sources.values().find(|source| source.contains(&head));
+    let source = source.unwrap_or_else(|| panic!("no enum {name}"));
+    let lines = code(source).skip_while(|line| !line.contains(&head));
+    (variants(lines), literals(source))
 }
 
 /// First cells of the rows of a page's table that are code.

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
 use crate::assert_none;
-use crate::comments::doc_comments;
 use crate::markdown::{Pieces, pieces};
+use crate::source::doc_comments;
 use crate::tree::{files, root, sources};
 
 /// A page, or one doc comment.
@@ -27,7 +27,7 @@ pub(crate) fn texts() -> Vec<Text> {
         if file.starts_with("tests/house/") {
             continue;
         }
-        for (line, text) in doc_comments(&source) {
+        for (line, text, _) in doc_comments(&source) {
             let pieces = pieces(&text, line);
             let file = file.clone();
             found.push(Text { file, pieces });

@@ -69,7 +69,6 @@ pub enum ProgramError {
     Arc {
         line: usize,
         what: String,
-        /// Remedy.
         remedy: &'static str,
     },
     /// An arc whose ends are at different distances from its centre.

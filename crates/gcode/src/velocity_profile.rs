@@ -29,7 +29,6 @@ pub(super) struct Phase {
     /// Acceleration there, mm/s^2.
     acceleration_mm_s2: f64,
     jerk_mm_s3: f64,
-    /// Duration, s.
     pub(super) duration_s: f64,
 }
 

@@ -1,6 +1,6 @@
 //! Parts that several pages have.
 
-use quadrant_report::{Cell, Column, Figure, Lines, Plot, Provenance, Series, Spread, Style};
+use quadrant_report::{Cell, Column, Figure, Lines, Plot, Provenance, Series, Style};
 
 use crate::experiment::statistic::Statistic;
 
@@ -24,16 +24,6 @@ pub fn statistic_cells(statistic: Option<Statistic>, scale: f64, decimals: usize
         cell(statistic.map(|found| found.mean)),
         cell(statistic.and_then(|found| found.deviation)),
     ]
-}
-
-/// A dot at the mean with a bar over one deviation to each side, in the unit that `scale` makes.
-pub fn dot(statistic: Statistic, scale: f64) -> Spread {
-    let (low, high) = statistic.range();
-    Spread {
-        mean: scale * statistic.mean,
-        low: scale * low,
-        high: scale * high,
-    }
 }
 
 /// An error in mm over time, as a curve in um; samples are `period_s` apart.

@@ -21,7 +21,6 @@ pub struct Row {
     pub default: String,
     /// The state in which it changes, in words.
     pub changes: &'static str,
-    /// Its meaning.
     pub meaning: &'static str,
 }
 

@@ -63,19 +63,14 @@ const chart = (() => {
   // Data in places, once for each figure
 
   const placed = (figure) => figure.curves.map((curve) => {
-    const on = (axis, values) => values?.map((v) => place(axis, v));
-    const { shape } = curve;
-    return {
-      x: on(figure.x, curve.x), y: on(figure.y, curve.y),
-      // A band's upper edge is on the vertical axis, the ends of error bars are on the horizontal one.
-      high: on(shape.kind === "band" ? figure.y : figure.x, shape.high), low: on(figure.x, shape.low),
-    };
+    const on = (axis, values) => values.map((v) => place(axis, v));
+    return { x: on(figure.x, curve.x), y: on(figure.y, curve.y) };
   });
 
   const extent = (axis, lists) => {
     if (axis.range) return axis.range.map((v) => place(axis, v));
     let [low, high] = [Infinity, -Infinity];
-    for (const list of lists) for (const at of list ?? []) if (Number.isFinite(at)) [low, high] = [Math.min(low, at), Math.max(high, at)];
+    for (const list of lists) for (const at of list) if (Number.isFinite(at)) [low, high] = [Math.min(low, at), Math.max(high, at)];
     if (low > high) return [0, 1];
     const pad = high > low ? axis.margin * (high - low) : 0.5 * Math.max(1, Math.abs(high));
     return [low - pad, high + pad];
@@ -88,7 +83,7 @@ const chart = (() => {
   // Returns the rectangle for curves in a drawing of this size, and the view with equal units where they are asked for.
   const layOut = (figure, view, [width, height]) => {
     const y = ticks(figure.y, view.y, height - TOP - BOTTOM, 45);
-    const letters = y.map(({ label }) => Math.max(0, ...(label ?? "").split("\n").map((line) => line.length)));
+    const letters = y.map(({ label }) => (label ?? "").length);
     const left = Math.min(LEFT + LETTER * Math.max(2, ...letters), width / 2);
     const frame = { left, right: width - RIGHT, top: TOP, bottom: height - BOTTOM };
     const size = { x: Math.max(1, frame.right - left), y: Math.max(1, frame.bottom - TOP) };
@@ -117,34 +112,13 @@ const chart = (() => {
     return path;
   };
 
-  // The outlines of a band's parts between gaps: along the lower edge and back along the upper one.
-  const outline = ({ toX, toY }, { x, y, high }) => {
-    let path = "", upper = [];
-    const close = () => { if (upper.length) path += `L${upper.reverse().join("L")}Z`; upper = []; };
-    for (let i = 0; i < x.length; i++) {
-      if (!Number.isFinite(x[i] + y[i] + high[i])) { close(); continue; }
-      path += `${upper.length ? "L" : "M"}${px(toX(x[i]))} ${px(toY(y[i]))}`;
-      upper.push(`${px(toX(x[i]))} ${px(toY(high[i]))}`);
-    }
-    close();
-    return path;
-  };
-
   const marks = ({ toX, toY }, xs, ys, mark) =>
     xs.map((x, i) => (Number.isFinite(x + ys[i]) ? `M${px(toX(x))} ${px(toY(ys[i]))}${mark}` : "")).join("");
-
-  const bars = ({ toX, toY }, { y, low, high }) => y.map((at, i) => {
-    if (!Number.isFinite(low[i] + high[i])) return "";
-    const [from, to, row] = [px(toX(low[i])), px(toX(high[i])), toY(at)];
-    return `M${from} ${px(row)}H${to}M${from} ${px(row - 3)}v6M${to} ${px(row - 3)}v6`;
-  }).join("");
 
   const drawCurve = (layout, curve, data) => {
     const { shape } = curve;
     const group = make("g", { class: "curve", style: `color:${curve.colour[0]};color:light-dark(${curve.colour})` });
     if (shape.kind === "line") group.append(make("path", { class: "stroke", "stroke-dasharray": shape.dash, d: line(layout, data.x, data.y) }));
-    if (shape.kind === "band") group.append(make("path", { class: "band", d: outline(layout, data) }));
-    if (shape.kind === "spread") group.append(make("path", { class: "stroke", d: bars(layout, data) }));
     if (shape.mark) group.append(make("path", { class: "mark", d: marks(layout, data.x, data.y, shape.mark) }));
     return group;
   };
@@ -153,11 +127,7 @@ const chart = (() => {
     const { frame, size, view, toX, toY } = layout;
     const group = make("g");
     const drawText = (x, y, anchor, text, name = "tick") => {
-      const lines = text.split("\n");
-      lines.forEach((part, i) => {
-        const down = y + 13 * (i - (lines.length - 1) / 2);
-        group.append(make("text", { class: name, x: px(x), y: px(down), "text-anchor": anchor }, part));
-      });
+      group.append(make("text", { class: name, x: px(x), y: px(y), "text-anchor": anchor }, text));
     };
     const isZero = (axis, at) => axis.zero && !axis.log && Math.abs(at) < 1e-9;
     for (const { at, label } of ticks(figure.x, view.x, size.x, 64)) {
@@ -221,15 +191,14 @@ const chart = (() => {
       const angle = (Math.atan2(curve.y[i], curve.x[i]) * 180 / Math.PI + 360) % 360;
       return `${short(shape.deviation[i])} µm at ${minus(angle.toFixed(1))}°`;
     }
-    const x = quantity(figure.x.label, curve.x[i]);
-    return shape.kind === "spread" ? `${x} (${short(shape.low[i])} to ${short(shape.high[i])})` : `${x}, ${quantity(figure.y.label, curve.y[i])}`;
+    return `${quantity(figure.x.label, curve.x[i])}, ${quantity(figure.y.label, curve.y[i])}`;
   };
 
   // The sample nearest to a point of the drawing, px, among curves that are shown.
   const nearest = (figure, data, { toX, toY }, isShown, x, y) => {
     let best = null, least = 40 ** 2;
     figure.curves.forEach((curve, c) => {
-      if (!isShown(c) || curve.shape.kind === "band") return;
+      if (!isShown(c)) return;
       const { x: xs, y: ys } = data[c];
       for (let i = 0; i < xs.length; i++) {
         const distance = (toX(xs[i]) - x) ** 2 + (toY(ys[i]) - y) ** 2;
@@ -253,7 +222,6 @@ const chart = (() => {
       const sample = make("g", { class: "curve", style: `color:${curve.colour[0]}` });
       const { kind, mark, dash } = curve.shape;
       if (kind === "line") sample.append(make("path", { class: "stroke", "stroke-dasharray": dash, d: `M${x} ${y}h26` }));
-      if (kind === "band") sample.append(make("path", { class: "band", d: `M${x} ${y - 5}h26v10h-26z` }));
       if (mark) sample.append(make("path", { class: "mark", d: `M${x + 13} ${y}${mark}` }));
       group.append(sample, make("text", { class: "tick", x: x + 33, y: y + 4 }, curve.name));
       x += length + 14;
@@ -292,8 +260,8 @@ const chart = (() => {
     const home = () => {
       const shown = data.filter((_, i) => isShown(i));
       return {
-        x: extent(figure.x, shown.flatMap((curve) => [curve.x])),
-        y: extent(figure.y, shown.flatMap((curve) => [curve.y, figure.x.range ? null : curve.high])),
+        x: extent(figure.x, shown.map((curve) => curve.x)),
+        y: extent(figure.y, shown.map((curve) => curve.y)),
       };
     };
 

@@ -45,9 +45,11 @@ pub(super) struct Curve {
     pub(super) colour: (&'static str, &'static str),
     pub(super) shape: Shape,
     pub(super) x: Vec<f64>,
-    /// Of a band, the lower edge.
     pub(super) y: Vec<f64>,
 }
+
+/// The mark of a measured point: a circle of 2.4 px about the middle.
+pub(super) const MARK: &str = "m-2.4 0a2.4 2.4 0 1 0 4.8 0a2.4 2.4 0 1 0 -4.8 0z";
 
 /// The shape of a curve. A mark is an outline in relative SVG path commands.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -61,18 +63,7 @@ pub(super) enum Shape {
         deviation: Option<Vec<f64>>,
     },
     Points {
-        mark: String,
-    },
-    Band {
-        high: Vec<f64>,
-    },
-    /// Points with error bars along the horizontal axis.
-    Spread {
-        mark: String,
-        #[serde(skip)]
-        index: usize,
-        low: Vec<f64>,
-        high: Vec<f64>,
+        mark: &'static str,
     },
 }
 
@@ -137,13 +128,9 @@ impl Curve {
 
     /// Runs of samples without a gap.
     pub(super) fn runs(&self) -> Vec<Vec<usize>> {
-        let upper = match &self.shape {
-            Shape::Band { high } => high,
-            _ => &self.y,
-        };
         let samples: Vec<usize> = (0..self.x.len()).collect();
         samples
-            .split(|&i| !(self.x[i].is_finite() && self.y[i].is_finite() && upper[i].is_finite()))
+            .split(|&i| !(self.x[i].is_finite() && self.y[i].is_finite()))
             .filter(|run| !run.is_empty())
             .map(<[usize]>::to_vec)
             .collect()

@@ -49,47 +49,6 @@ pub enum ReportError {
         /// The radius given.
         radius_mm: f64,
     },
-    /// A spread that does not enclose its mean.
-    #[error(
-        "figure {figure:?}, series {series:?}, category {category:?}: mean {mean} outside of {low} to {high}; give \
-         low <= mean <= high"
-    )]
-    Spread {
-        /// The figure's id.
-        figure: String,
-        /// The series' name.
-        series: String,
-        /// The category's name.
-        category: String,
-        /// Beginning of the bar.
-        low: f64,
-        /// Value of the dot.
-        mean: f64,
-        /// End of the bar.
-        high: f64,
-    },
-    /// A text that is no page in JSON.
-    #[error("no page in JSON: {source}; give a file that --format json wrote")]
-    Json {
-        /// Cause.
-        source: serde_json::Error,
-    },
-    /// A page in another format's version.
-    #[error(
-        "a page of schema {found:?}; this program reads {expected:?}: make the page again with this version"
-    )]
-    Schema {
-        /// The schema named in the file.
-        found: String,
-        /// The schema that is understood.
-        expected: &'static str,
-    },
-    /// An image that cannot be drawn.
-    #[error("the image cannot be drawn: {reason}")]
-    Image {
-        /// Reason.
-        reason: String,
-    },
     /// The file could not be written.
     #[error("cannot write {}", path.display())]
     Write {
@@ -98,16 +57,4 @@ pub enum ReportError {
         /// Cause.
         source: std::io::Error,
     },
-}
-
-impl ReportError {
-    pub(super) fn image(reason: impl std::fmt::Display) -> Self {
-        Self::Image {
-            reason: reason.to_string(),
-        }
-    }
-
-    pub(super) fn json(source: serde_json::Error) -> Self {
-        Self::Json { source }
-    }
 }

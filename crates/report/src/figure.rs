@@ -1,15 +1,14 @@
 //! Figures: a caption and one of the kinds of drawing.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::ReportError;
-use super::dots::Dots;
 use super::drawing::Drawing;
 use super::lines::Lines;
 use super::polar::PolarDeviation;
 
 /// A drawing with its caption.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figure {
     /// Unique on its page; also the name of the image a reader saves.
     pub id: String,
@@ -20,23 +19,20 @@ pub struct Figure {
 }
 
 /// The kinds of drawing.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Plot {
     /// Curves over a common axis, or paths in a plane.
     Lines(Lines),
     /// Radial deviation from a circle.
     PolarDeviation(PolarDeviation),
-    /// Values by category, with their spread.
-    Dots(Dots),
 }
 
 impl Figure {
     /// Number of entries in the legend.
     pub(super) fn curve_count(&self) -> usize {
         match &self.plot {
-            Plot::Lines(lines) => lines.bands.len() + lines.series.len(),
+            Plot::Lines(lines) => lines.series.len(),
             Plot::PolarDeviation(circle) => circle.traces.len(),
-            Plot::Dots(dots) => dots.series.len(),
         }
     }
 
@@ -45,7 +41,6 @@ impl Figure {
         match &self.plot {
             Plot::Lines(_) => None,
             Plot::PolarDeviation(circle) => Some(circle.scale_note()),
-            Plot::Dots(_) => None,
         }
     }
 
@@ -53,7 +48,6 @@ impl Figure {
         match &self.plot {
             Plot::Lines(lines) => lines.check(&self.id),
             Plot::PolarDeviation(circle) => circle.check(&self.id),
-            Plot::Dots(dots) => dots.check(&self.id),
         }
     }
 
@@ -62,7 +56,6 @@ impl Figure {
         let plot = match &self.plot {
             Plot::Lines(lines) => Plot::Lines(lines.decimated(points)),
             Plot::PolarDeviation(circle) => Plot::PolarDeviation(circle.decimated(points)),
-            Plot::Dots(dots) => Plot::Dots(dots.clone()),
         };
         Self {
             id: self.id.clone(),
@@ -76,7 +69,6 @@ impl Figure {
         let mut drawing = match &self.plot {
             Plot::Lines(lines) => lines.drawing(),
             Plot::PolarDeviation(circle) => circle.drawing(),
-            Plot::Dots(dots) => dots.drawing(),
         };
         drawing.caption.clone_from(&self.caption);
         drawing

@@ -182,13 +182,12 @@ impl Numbered<'_> {
 
 /// The box of a drawing. Its height is settled before it is drawn, so that nothing on the page moves.
 fn drawing(figure: &Figure) -> Markup {
-    let (kind, rows) = match &figure.plot {
-        Plot::Lines(_) => ("lines", None),
-        Plot::PolarDeviation(_) => ("polar", None),
-        Plot::Dots(dots) => ("dots", Some(format!("--rows:{:.2}", dots.rows()))),
+    let kind = match &figure.plot {
+        Plot::Lines(_) => "lines",
+        Plot::PolarDeviation(_) => "polar",
     };
     html! {
-        div.drawing data-figure=(figure.id) data-kind=(kind) style=[rows] role="group" aria-label=(figure.caption) {}
+        div.drawing data-figure=(figure.id) data-kind=(kind) role="group" aria-label=(figure.caption) {}
     }
 }
 
@@ -215,8 +214,7 @@ fn sample(shape: &Shape) -> Markup {
     html! {
         @match shape {
             Shape::Line { dash, .. } => path.stroke d={ "M0 " (middle) "H" (width) } stroke-dasharray=[*dash] {},
-            Shape::Band { .. } => path.band d={ "M0 0H" (width) "V" (height) "H0Z" } {},
-            Shape::Points { mark } | Shape::Spread { mark, .. } => path.mark d={ "M" (width / 2.0) " " (middle) (mark) } {},
+            Shape::Points { mark } => path.mark d={ "M" (width / 2.0) " " (middle) (mark) } {},
         }
     }
 }

@@ -1,13 +1,12 @@
 //! Curves over a common axis, and paths in a plane.
 
-use super::drawing::{Axis, Curve, Drawing, Shape};
-use super::mark::Mark;
+use super::drawing::{Axis, Curve, Drawing, MARK, Shape};
 use super::samples::{pick, same_length};
-use super::{Colour, Dash, ReportError, Scale, Style, decimate};
-use serde::{Deserialize, Serialize};
+use super::{Dash, ReportError, Scale, Style, decimate};
+use serde::Serialize;
 
 /// Curves over a common axis, or paths in a plane.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Lines {
     /// Horizontal axis, with its unit.
     pub x_label: String,
@@ -22,69 +21,26 @@ pub struct Lines {
     /// One unit is as long on both axes, as a Nyquist plot needs; for linear scales.
     pub equal_units: bool,
     /// Ends of the vertical axis, for figures that are compared; without them it fits the curves. For a linear scale.
-    #[serde(default)]
     pub y_range: Option<(f64, f64)>,
-    /// Shaded bands, behind the curves.
-    #[serde(default)]
-    pub bands: Vec<Band>,
 }
 
 /// One curve. Samples that are not finite are gaps.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Series {
     /// For the legend.
     pub name: String,
     /// Abscissas.
-    #[serde(with = "super::number::list")]
+    #[serde(serialize_with = "super::number::list")]
     pub x: Vec<f64>,
     /// Ordinates, as many.
-    #[serde(with = "super::number::list")]
+    #[serde(serialize_with = "super::number::list")]
     pub y: Vec<f64>,
     /// Style of the curve.
     pub style: Style,
 }
 
-/// A shaded band between two curves. Samples that are not finite are gaps.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Band {
-    /// For the legend.
-    pub name: String,
-    /// Abscissas, in order.
-    #[serde(with = "super::number::list")]
-    pub x: Vec<f64>,
-    /// Its lower edge, as many ordinates.
-    #[serde(with = "super::number::list")]
-    pub low: Vec<f64>,
-    /// Its upper edge, as many ordinates.
-    #[serde(with = "super::number::list")]
-    pub high: Vec<f64>,
-    /// Colour of the shade.
-    pub colour: Colour,
-}
-
-impl Band {
-    /// The same with about `points` samples, among them the extremes of both edges.
-    fn decimated(&self, points: usize) -> Self {
-        let mut kept = decimate(&self.x, &self.low, points / 2);
-        kept.extend(decimate(&self.x, &self.high, points / 2));
-        kept.sort_unstable();
-        kept.dedup();
-        Self {
-            name: self.name.clone(),
-            x: pick(&self.x, &kept),
-            low: pick(&self.low, &kept),
-            high: pick(&self.high, &kept),
-            colour: self.colour,
-        }
-    }
-}
-
 impl Lines {
     pub(super) fn check(&self, figure: &str) -> Result<(), ReportError> {
-        for band in &self.bands {
-            same_length(figure, &band.name, band.x.len(), band.low.len())?;
-            same_length(figure, &band.name, band.x.len(), band.high.len())?;
-        }
         self.series
             .iter()
             .try_for_each(|s| same_length(figure, &s.name, s.x.len(), s.y.len()))
@@ -106,26 +62,18 @@ impl Lines {
             x_label: self.x_label.clone(),
             y_label: self.y_label.clone(),
             series: series.collect(),
-            bands: self.bands.iter().map(|b| b.decimated(points)).collect(),
             ..*self
         }
     }
 
     /// All abscissas.
     pub(super) fn abscissas(&self) -> impl Iterator<Item = f64> {
-        let bands = self.bands.iter().flat_map(|band| &band.x);
-        bands
-            .chain(self.series.iter().flat_map(|series| &series.x))
-            .copied()
+        self.series.iter().flat_map(|series| &series.x).copied()
     }
 
     /// All ordinates.
     pub(super) fn ordinates(&self) -> impl Iterator<Item = f64> {
-        let bands = self.bands.iter();
-        bands
-            .flat_map(|band| band.low.iter().chain(&band.high))
-            .chain(self.series.iter().flat_map(|series| &series.y))
-            .copied()
+        self.series.iter().flat_map(|series| &series.y).copied()
     }
 
     pub(super) fn drawing(&self) -> Drawing {
@@ -135,18 +83,9 @@ impl Lines {
         let y_step = 1e-5 * self.y_scale.span(self.ordinates());
         let short_x = |values: &[f64]| self.x_scale.shortened(values, x_step);
         let short_y = |values: &[f64]| self.y_scale.shortened(values, y_step);
-        let bands = self.bands.iter().map(|band| {
-            let shape = Shape::Band {
-                high: short_y(&band.high),
-            };
-            let edge = (short_x(&band.x), short_y(&band.low));
-            Curve::new(&band.name, band.colour, shape, edge)
-        });
         let series = self.series.iter().map(|series| {
             let shape = match series.style.dash {
-                Dash::Points => Shape::Points {
-                    mark: Mark::Circle.outline(2.4),
-                },
+                Dash::Points => Shape::Points { mark: MARK },
                 dash => Shape::Line {
                     dash: dash.pattern(),
                     deviation: None,
@@ -155,7 +94,6 @@ impl Lines {
             let samples = (short_x(&series.x), short_y(&series.y));
             Curve::new(&series.name, series.style.colour, shape, samples)
         });
-        let curves = bands.chain(series).collect();
         let has_points = self.series.iter().any(|s| s.style.dash == Dash::Points);
         let x = Axis {
             // Curves over time begin at the axis; marks, and paths in a plane, need room on all sides.
@@ -178,7 +116,7 @@ impl Lines {
             x,
             y,
             equal: self.equal_units,
-            curves,
+            curves: series.collect(),
             circles: Vec::new(),
             texts: Vec::new(),
         }
@@ -187,7 +125,7 @@ impl Lines {
 
 #[cfg(test)]
 mod tests {
-    use super::{Band, Lines, Series};
+    use super::{Lines, Series};
     use crate::{Colour, Scale, Style};
 
     fn json(lines: Lines) -> String {
@@ -240,36 +178,5 @@ mod tests {
             ..lines(Style::solid(Colour::Blue))
         });
         assert!(json.contains("\"equal\":true"), "{json}");
-    }
-
-    #[test]
-    fn bands_break_at_gaps_and_keep_their_extremes() {
-        let n = 5000;
-        let mut low = vec![-1.0; n];
-        low[1234] = -9.0;
-        let mut high = vec![1.0; n];
-        high[4321] = 9.0;
-        high[2500] = f64::NAN;
-        let band = Band {
-            name: "spread".to_owned(),
-            x: (0..n).map(|i| i as f64).collect(),
-            low,
-            high,
-            colour: Colour::Sky,
-        };
-        let thin = band.decimated(200);
-        assert!(thin.x.len() <= 200, "{}", thin.x.len());
-        assert!(thin.low.contains(&-9.0) && thin.high.contains(&9.0));
-        let lines = Lines {
-            bands: vec![thin],
-            ..Lines::default()
-        };
-        let runs = lines.drawing().curves[0].runs();
-        assert_eq!(runs.len(), 2);
-        assert!(
-            runs.concat()
-                .iter()
-                .all(|&i| lines.bands[0].high[i].is_finite())
-        );
     }
 }

@@ -9,11 +9,7 @@
 
   const size = (drawing, printing) => {
     if (!printing) return [drawing.clientWidth, drawing.clientHeight];
-    switch (drawing.dataset.kind) {
-      case "polar": return [560, 590];
-      case "dots": return [sheet, drawing.clientHeight];
-      default: return [sheet, sheet / 2];
-    }
+    return drawing.dataset.kind === "polar" ? [560, 590] : [sheet, sheet / 2];
   };
 
   // The chart of each drawing that the reader has come near to.

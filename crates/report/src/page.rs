@@ -1,7 +1,7 @@
 //! The page: sections of prose, tables and figures.
 
 use super::{Figure, ReportError, Table};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::collections::HashSet;
 
 /// Points on the whole page. Three million numbers' worth of text would be drawn no finer, and the page stays below
@@ -14,7 +14,7 @@ const POINTS_PER_SERIES: (usize, usize) = (400, 8_000);
 const RESERVED: [&str; 2] = ["contents", "theme"];
 
 /// A report.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Page {
     /// Its title.
     pub title: String,
@@ -27,7 +27,7 @@ pub struct Page {
 }
 
 /// Provenance: all that a reader needs to make the same page again.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Provenance {
     /// The command line.
     pub command: String,
@@ -38,7 +38,7 @@ pub struct Provenance {
 }
 
 /// A section.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Section {
     /// Unique on the page; the section's link target.
     pub id: String,
@@ -53,7 +53,7 @@ pub struct Section {
 }
 
 /// A table or a figure.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Block {
     /// A table.
     Table(Table),

@@ -3,10 +3,10 @@
 //! They are those of Okabe and Ito ("Color Universal Design", 2008), which readers with the usual forms of colour blindness
 //! can distinguish; yellow is left out, because thin yellow lines vanish on white paper.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// The colour of a series.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Colour {
     /// Black, or nearly white on a dark page: for references and recorded data.
     Ink,

@@ -4,7 +4,7 @@ use super::drawing::{Axis, Circle, Curve, Drawing, Shape, Text};
 use super::samples::{pick, same_length};
 use super::scale::rounded;
 use super::{ReportError, Scale, Style, decimate};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::f64::consts::TAU;
 
 /// Largest share of the radius that the magnified deviation may take.
@@ -15,7 +15,7 @@ const DIVISIONS: f64 = 3.0;
 const LABEL_ANGLE: f64 = TAU / 8.0;
 
 /// Radial deviation from a circle, magnified.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PolarDeviation {
     /// Radius of the nominal circle, mm.
     pub radius_mm: f64,
@@ -28,15 +28,15 @@ pub struct PolarDeviation {
 }
 
 /// One measured circle.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeviationTrace {
     /// For the legend.
     pub name: String,
     /// Angle of each sample from the horizontal axis, rad.
-    #[serde(with = "super::number::list")]
+    #[serde(serialize_with = "super::number::list")]
     pub angle_rad: Vec<f64>,
     /// Radius less the nominal one, um.
-    #[serde(with = "super::number::list")]
+    #[serde(serialize_with = "super::number::list")]
     pub deviation_um: Vec<f64>,
     /// Style of the trace.
     pub style: Style,

@@ -1,9 +1,9 @@
 //! Scales of axes.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// The scale of an axis.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub enum Scale {
     /// Even.
     #[default]

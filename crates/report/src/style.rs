@@ -1,11 +1,11 @@
 //! Styles of curves: colour and dashes.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::Colour;
 
 /// Style of a curve.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Style {
     /// Its colour.
     pub colour: Colour,
@@ -14,7 +14,7 @@ pub struct Style {
 }
 
 /// The dashes of a line. Colour alone does not carry meaning in print.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Dash {
     /// Unbroken.
     Solid,
@@ -24,6 +24,17 @@ pub enum Dash {
     Dotted,
     /// Marks that are not joined: measured points.
     Points,
+}
+
+impl Dash {
+    /// Lengths of dashes and gaps, px, as SVG takes them.
+    pub(super) const fn pattern(self) -> Option<&'static str> {
+        match self {
+            Self::Solid | Self::Points => None,
+            Self::Dashed => Some("6 4"),
+            Self::Dotted => Some("2 3"),
+        }
+    }
 }
 
 impl Style {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, TableStyle};
 use quadrant_written::fixed;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::ReportError;
 use super::wrap::wrapped;
@@ -24,7 +24,7 @@ const WRAPPED_WIDTH: usize = 24;
 const SPACE: usize = 3;
 
 /// A table of results.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Table {
     /// Unique on its page; also the name of its CSV file.
     pub id: String,
@@ -37,7 +37,7 @@ pub struct Table {
 }
 
 /// The head of a column.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Column {
     /// Heading of the column.
     pub heading: String,
@@ -78,14 +78,14 @@ impl Column {
 }
 
 /// One entry of a table.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Cell {
     /// Words.
     Text(String),
     /// A number, shown rounded, exported in full.
     Number {
         /// The value.
-        #[serde(with = "super::number")]
+        #[serde(serialize_with = "super::number::one")]
         value: f64,
         /// Digits shown after the decimal point.
         decimals: usize,

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use quadrant_written::whole;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::{Dots, Figure, Lines, Page, Plot, PolarDeviation, ReportError};
+use super::{Figure, Lines, Page, Plot, PolarDeviation, ReportError};
 
 /// Names the meaning of a page's JSON; a change of meaning changes the number.
 const SCHEMA: &str = "quadrant-report/1";
@@ -27,10 +27,10 @@ pub enum Format {
 }
 
 /// A page in a JSON file.
-#[derive(Serialize, Deserialize)]
-struct Document<P> {
-    schema: String,
-    page: P,
+#[derive(Serialize)]
+struct Document {
+    schema: &'static str,
+    page: Page,
 }
 
 impl Page {
@@ -91,31 +91,13 @@ impl Page {
     pub fn to_json(&self) -> Result<String, ReportError> {
         self.check()?;
         let document = Document {
-            schema: SCHEMA.to_owned(),
+            schema: SCHEMA,
             page: self.decimated(self.points_per_series()),
         };
         let mut text =
             serde_json::to_string(&document).expect("a page has nothing JSON cannot hold");
         text.push('\n');
         Ok(text)
-    }
-
-    /// Reads what [`Self::to_json`] wrote.
-    ///
-    /// # Errors
-    /// [`ReportError::Json`] for what is no JSON or no page of this format's version; what [`Self::to_html`] refuses.
-    pub fn from_json(text: &str) -> Result<Self, ReportError> {
-        let document: Document<serde_json::Value> =
-            serde_json::from_str(text).map_err(ReportError::json)?;
-        if document.schema != SCHEMA {
-            return Err(ReportError::Schema {
-                found: document.schema,
-                expected: SCHEMA,
-            });
-        }
-        let page: Self = serde_json::from_value(document.page).map_err(ReportError::json)?;
-        page.check()?;
-        Ok(page)
     }
 }
 
@@ -131,7 +113,6 @@ impl Figure {
         match &self.plot {
             Plot::Lines(lines) => lines_csv(lines, &mut row),
             Plot::PolarDeviation(circle) => circle_csv(circle, &mut row),
-            Plot::Dots(dots) => dots_csv(dots, &mut row),
         }
         let bytes = csv.into_inner().expect("memory takes every byte");
         Ok(String::from_utf8(bytes).expect("CSV of text is text"))
@@ -147,31 +128,14 @@ fn number(value: f64) -> String {
 }
 
 fn lines_csv(lines: &Lines, row: &mut dyn FnMut(Vec<String>)) {
-    let has_bands = !lines.bands.is_empty();
-    let edges = |edges: [String; 2]| has_bands.then_some(edges).into_iter().flatten();
-    let head = [
+    row(vec![
         "series".to_owned(),
         lines.x_label.clone(),
         lines.y_label.clone(),
-    ];
-    row(head
-        .into_iter()
-        .chain(edges(["low", "high"].map(str::to_owned)))
-        .collect());
-    for band in &lines.bands {
-        for (i, &x) in band.x.iter().enumerate() {
-            let place = [band.name.clone(), number(x), String::new()];
-            let shade = edges([number(band.low[i]), number(band.high[i])]);
-            row(place.into_iter().chain(shade).collect());
-        }
-    }
+    ]);
     for series in &lines.series {
         for (&x, &y) in series.x.iter().zip(&series.y) {
-            let place = [series.name.clone(), number(x), number(y)];
-            row(place
-                .into_iter()
-                .chain(edges([String::new(), String::new()]))
-                .collect());
+            row(vec![series.name.clone(), number(x), number(y)]);
         }
     }
 }
@@ -183,20 +147,6 @@ fn circle_csv(circle: &PolarDeviation, row: &mut dyn FnMut(Vec<String>)) {
     for trace in &circle.traces {
         for (&angle, &deviation) in trace.angle_rad.iter().zip(&trace.deviation_um) {
             row(vec![trace.name.clone(), number(angle), number(deviation)]);
-        }
-    }
-}
-
-fn dots_csv(dots: &Dots, row: &mut dyn FnMut(Vec<String>)) {
-    row(["category", "series", &dots.value_label, "low", "high"]
-        .map(str::to_owned)
-        .into());
-    for (i, category) in dots.categories.iter().enumerate() {
-        for series in &dots.series {
-            let value = series.values[i];
-            let numbers = [value.mean, value.low, value.high].map(number);
-            let names = [category.clone(), series.name.clone()];
-            row(names.into_iter().chain(numbers).collect());
         }
     }
 }

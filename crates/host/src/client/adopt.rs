@@ -33,10 +33,7 @@ pub enum AdoptError {
     #[error(
         "{axis} does not learn; `set {axis}/feedforward/learning present` and `apply` let it, then run what it works at"
     )]
-    Off {
-        /// The axis.
-        axis: AxisName,
-    },
+    Off { axis: AxisName },
     /// The gain would leave its range.
     #[error(
         "{path} would be {gain:.2}, and may be at most {MOST}: friction is far from what was commissioned; look after the axis and identify its friction again"

@@ -9,43 +9,18 @@ use super::samples::Samples;
 
 /// The name of a channel's column, with its unit: of an axis as the other commands know it, `position_mm`.
 pub fn column(channel: Channel) -> String {
-    match channel {
-        Channel::Axis(_, signal) => axis_column(signal).to_owned(),
-        Channel::Stage(signal) => match signal {
-            StageSignal::Elapsed => "elapsed_cycles".to_owned(),
-            StageSignal::CircleDeviation => "circle_deviation_um".to_owned(),
-            StageSignal::CircleAngle => "circle_angle_deg".to_owned(),
-            other => other.as_str().to_owned(),
-        },
-    }
-}
-
-const fn axis_column(signal: AxisSignal) -> &'static str {
-    match signal {
-        AxisSignal::Reference => "reference_mm",
-        AxisSignal::Position => "position_mm",
-        AxisSignal::Error => "error_mm",
-        AxisSignal::Velocity => "velocity_mm_s",
-        AxisSignal::Proportional => "p_v",
-        AxisSignal::Integral => "i_v",
-        AxisSignal::Derivative => "d_v",
-        AxisSignal::Level => "level_v",
-        AxisSignal::Viscous => "viscous_v",
-        AxisSignal::Presliding => "presliding_v",
-        AxisSignal::Inertia => "inertia_v",
-        AxisSignal::BumplessOffset => "transfer_v",
-        AxisSignal::Output => "voltage_v",
-        AxisSignal::Code => "code",
-        AxisSignal::LimitedBy => "limited_by",
-        AxisSignal::Injection => "injection_v",
-        AxisSignal::CodeSum => "code_sum",
-        AxisSignal::Glitch => "glitch_um",
-        AxisSignal::FrictionScale => "friction_scale",
-        AxisSignal::Learning => "learning",
-        AxisSignal::VibrationGate => "vibration_gate",
-        AxisSignal::ErrorSquares => "error_squares",
-        AxisSignal::ErrorSquaresOff => "error_squares_off",
-    }
+    let name = match channel {
+        Channel::Axis(_, AxisSignal::Output) => return "voltage_v".to_owned(),
+        Channel::Stage(StageSignal::Tick) => return "tick".to_owned(),
+        Channel::Stage(StageSignal::Elapsed) => return "elapsed_cycles".to_owned(),
+        Channel::Axis(_, signal) => signal.as_str(),
+        Channel::Stage(signal) => signal.as_str(),
+    };
+    let with_unit = match channel.physical_unit() {
+        "" => name.to_owned(),
+        unit => format!("{name}_{unit}"),
+    };
+    with_unit.replace(['-', '/'], "_").to_lowercase()
 }
 
 /// A channel's values in its column's unit: positions in mm, by the length of a count of each axis.
@@ -108,4 +83,20 @@ fn of_axis(path: &Path, axis: AxisName) -> PathBuf {
         None => format!("{stem}-{axis}"),
     };
     path.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_of_an_axis_have_the_names_that_every_command_reads() {
+        let names: Vec<String> = Channel::all().map(column).collect();
+        let of_x = "reference_mm position_mm error_mm velocity_mm_s p_v i_v d_v level_v viscous_v presliding_v inertia_v transfer_v \
+                    voltage_v code limited_by injection_v code_sum glitch_um friction_scale learning vibration_gate error_squares \
+                    error_squares_off";
+        let of_stage = "state fault tick elapsed_cycles circle_deviation_um circle_angle_deg";
+        let expected = [of_x, of_x, of_x, of_stage].join(" ");
+        assert_eq!(names.join(" "), expected);
+    }
 }

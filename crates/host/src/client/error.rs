@@ -13,11 +13,8 @@ pub enum ClientError {
     /// The connection is broken.
     #[error("{endpoint}: {source}; {remedy}")]
     Connection {
-        /// Endpoint of the connection.
         endpoint: String,
-        /// The error that caused this.
         source: io::Error,
-        /// Remedy, for the message.
         remedy: &'static str,
     },
     /// No answer came in time.
@@ -25,15 +22,12 @@ pub enum ClientError {
         "{what}: no answer from {endpoint} within {waited_ms} ms, asked {attempts} times; {remedy}"
     )]
     Silent {
-        /// Name of the request.
         what: &'static str,
-        /// Endpoint of the connection.
         endpoint: String,
         /// Waiting time of all attempts, ms.
         waited_ms: u128,
         /// Number of attempts that were made.
         attempts: u32,
-        /// Remedy, for the message.
         remedy: &'static str,
     },
     /// No answer came to a request that must not be made twice.
@@ -42,9 +36,7 @@ pub enum ClientError {
          was not asked again: look at `status`"
     )]
     Unsure {
-        /// Name of the request.
         what: &'static str,
-        /// Endpoint of the connection.
         endpoint: String,
         /// Time waited for it, ms.
         waited_ms: u128,
@@ -55,7 +47,6 @@ pub enum ClientError {
          release, or flash the firmware of this one (`quadrant connect flash`)"
     )]
     Version {
-        /// Endpoint of the connection.
         endpoint: String,
         /// Protocol version of the machine.
         theirs: u8,
@@ -71,16 +62,11 @@ pub enum ClientError {
         "{what}: the machine has restarted, so this was not done; the session is open again, but outputs are off and home \
          positions are lost: look at `status`"
     )]
-    Restarted {
-        /// Name of the request.
-        what: &'static str,
-    },
+    Restarted { what: &'static str },
     /// The machine said no.
     #[error("{what}: {source}")]
     Refused {
-        /// Name of the request.
         what: &'static str,
-        /// The error that caused this.
         source: LinkError,
     },
     /// The machine answered something else.
@@ -88,9 +74,7 @@ pub enum ClientError {
         "{what}: {endpoint} answered with something else ({answer}); use host tools and firmware of one release"
     )]
     Unexpected {
-        /// Name of the request.
         what: &'static str,
-        /// Endpoint of the connection.
         endpoint: String,
         /// Name of the reply that came.
         answer: &'static str,
@@ -112,7 +96,6 @@ pub enum ClientError {
     Setting {
         /// Its path, and the value if there is one.
         path: String,
-        /// The error that caused this.
         source: TreeError,
     },
     /// A latched fault ended what was waited for.
@@ -134,7 +117,6 @@ pub enum ClientError {
         tick: u32,
         /// Cause, as the machine words it.
         cause: String,
-        /// Remedy, for the message.
         remedy: String,
     },
     /// A motion is under way, which a measurement would mistake for its own.
@@ -162,7 +144,6 @@ pub enum ClientError {
         what: &'static str,
         /// Time waited for it, s.
         waited_s: f64,
-        /// Remedy, for the message.
         remedy: &'static str,
     },
 }

@@ -39,11 +39,6 @@ impl MemoryFlash {
     pub fn set_outputs_off(&self, off: bool) {
         self.outputs_off.set(off);
     }
-
-    /// The same, to be damaged.
-    pub fn bytes_mut(&mut self) -> &mut [u8] {
-        &mut self.bytes
-    }
 }
 
 impl Default for MemoryFlash {

@@ -35,5 +35,5 @@ pub use path::Point;
 pub use request::{CircleCase, CircleRequest, CircleResult, CircleTest, run_circle_tests};
 pub use roundness::{Both, both};
 pub use single::{CircleOutcome, FEED_MM_S, RADIUS_MM, run_circles};
-pub use spikes::{AT_RAD, Spikes};
+pub use spikes::Spikes;
 pub use turn::{CircleRefusal, NominalCircle, Turn, run_path, run_turn};

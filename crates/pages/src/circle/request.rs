@@ -38,7 +38,6 @@ impl Default for CircleRequest {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CircleCase {
     pub plane: Plane,
-    /// Radius, mm.
     pub radius_mm: f64,
     /// Feed along the path, mm/min.
     pub feed_mm_min: f64,

@@ -2,15 +2,8 @@
 
 use quadrant_law::reference::Sense;
 
-/// Angles at which an axis reverses, rad: on the plane's first axis, on its second, and opposite of each.
-pub const AT_RAD: [f64; 4] = [
-    0.0,
-    0.5 * std::f64::consts::PI,
-    std::f64::consts::PI,
-    1.5 * std::f64::consts::PI,
-];
-
-/// The spikes of one turn, by [`AT_RAD`]; mm, outwards positive.
+/// The spikes of one turn: where an axis reverses on the plane's first axis, on its second, and opposite of each; mm, outwards
+/// positive.
 ///
 /// A spike is the radial deviation within a window about the reversal that is farthest from the level before it: the mean
 /// deviation over half a window's width before the window. So it is how far the reversal throws the path, and a deviation

@@ -47,9 +47,7 @@ impl Entry {
 pub struct Request<'a> {
     /// The stages, each with the settings of its law.
     pub setups: &'a [RunConfiguration],
-    /// The configurations.
     pub configurations: &'a [Configuration],
-    /// The sines.
     pub sines: Vec<Sines>,
     /// The first seed of the noise; the others follow it.
     pub seed: u64,
@@ -92,11 +90,6 @@ impl Request<'_> {
         runs
     }
 
-    /// About how long the runs take on two cores, s.
-    pub fn expected_s(&self) -> f64 {
-        self.runs().iter().map(Run::expected_s).sum()
-    }
-
     /// Runs everything, in parallel; the same request gives the same entries. `advance` receives the share of the whole
     /// that each finished run was.
     ///
@@ -104,7 +97,7 @@ impl Request<'_> {
     /// The first refused setting or fault.
     pub fn run(&self, advance: &(dyn Fn(f64) + Sync)) -> Result<Comparison, RunError> {
         let runs = self.runs();
-        let whole_s = self.expected_s();
+        let whole_s: f64 = runs.iter().map(Run::expected_s).sum();
         let outcomes: Vec<Vec<Outcome>> = runs
             .par_iter()
             .map(|run| {

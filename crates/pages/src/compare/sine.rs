@@ -27,7 +27,6 @@ const LEAD_S: f64 = 0.5;
 /// Sines of an axis, which run side by side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sines {
-    /// The axis.
     pub axis: AxisName,
     /// Their amplitude, mm; above zero and within the axis' travel.
     pub amplitude_mm: f64,

@@ -14,7 +14,6 @@ pub struct Subject {
     pub stage: String,
     /// Whose gains the settings have: "the thesis'".
     pub own: &'static str,
-    /// The sines.
     pub sines: Sines,
     /// Friction as the laws know it.
     pub knowledge: Vec<ModelKnowledge>,

@@ -14,7 +14,6 @@ use crate::parts::{lines, series};
 pub(super) struct DrawnLoop<'a, L: OpenLoop> {
     pub(super) name: &'a str,
     pub(super) open_loop: &'a L,
-    /// Style.
     pub(super) style: Style,
 }
 

@@ -7,7 +7,6 @@ use quadrant_tune::identify::response::FrequencyResponse;
 pub(super) struct Curve<'a> {
     pub(super) name: String,
     pub(super) response: &'a FrequencyResponse,
-    /// Style.
     pub(super) style: Style,
 }
 

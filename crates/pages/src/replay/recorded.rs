@@ -135,7 +135,7 @@ impl RecordedAxis {
 ///
 /// # Errors
 /// No PID has the margins, or keeps the bounds of the best one.
-pub fn emps_axis() -> Result<Axis, ReplayError> {
+fn emps_axis() -> Result<Axis, ReplayError> {
     let per_newton = 1.0 / emps::FORCE_N_PER_V;
     let gain = emps::FORCE_N_PER_V / emps::MASS_KG * 1e3;
     let friction = PerDirection::both(StaticFriction {

@@ -4,7 +4,7 @@
 //! largest Ki that a stated set of margins does not notice, rounded down to two significant digits, so that it can be
 //! written down and found again.
 
-use quadrant_law::control::{pid::PidGains, plant_model::PlantModel};
+use quadrant_law::control::pid::PidGains;
 use quadrant_sim::margins::Margins;
 
 use super::form::Form;
@@ -12,87 +12,6 @@ use super::process::Process;
 
 /// Most halvings between a gain that is acceptable and one that is not.
 const HALVINGS: usize = 80;
-
-/// A figure as a publication prints it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Printed {
-    pub value: f64,
-    /// Digits after the decimal point.
-    pub decimals: usize,
-}
-
-impl Printed {
-    /// Returns true if an exact value would be printed the same.
-    pub fn reads(&self, exact: f64) -> bool {
-        format!("{:.*}", self.decimals, exact) == format!("{:.*}", self.decimals, self.value)
-    }
-}
-
-/// The four margins of a loop as a publication prints them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PrintedMargins {
-    /// Gain margin, dB.
-    pub gain_margin_db: Printed,
-    /// Its frequency, Hz.
-    pub phase_crossover_hz: Printed,
-    /// Phase margin, deg.
-    pub phase_margin_deg: Printed,
-    /// Its frequency, Hz.
-    pub gain_crossover_hz: Printed,
-}
-
-impl PrintedMargins {
-    /// The open loop of the x axis with the PID (thesis, Fig 4.2): 9.9 dB at 194 Hz, 54.2 deg at 64.9 Hz.
-    pub const THESIS_X: Self = Self {
-        gain_margin_db: Printed {
-            value: 9.9,
-            decimals: 1,
-        },
-        phase_crossover_hz: Printed {
-            value: 194.0,
-            decimals: 0,
-        },
-        phase_margin_deg: Printed {
-            value: 54.2,
-            decimals: 1,
-        },
-        gain_crossover_hz: Printed {
-            value: 64.9,
-            decimals: 1,
-        },
-    };
-
-    /// Returns true if exact margins would be printed the same.
-    pub fn read(&self, exact: &Margins) -> bool {
-        self.gain_margin_db.reads(exact.gain_margin_db)
-            && self.phase_crossover_hz.reads(exact.phase_crossover_hz)
-            && self.phase_margin_deg.reads(exact.phase_margin_deg)
-            && self.gain_crossover_hz.reads(exact.gain_crossover_hz)
-    }
-}
-
-/// The largest Ki, V/(mm s), rounded down to two significant digits, with which the continuous loop's margins still
-/// read as printed; nothing when they do not even without integral action.
-///
-/// Kp in V/mm, Kd in V s/mm, and the derivative filter's time constant in s are given.
-pub fn largest_integral_gain(
-    plant: &PlantModel,
-    kp_v_per_mm: f64,
-    kd_v_s_per_mm: f64,
-    derivative_filter_s: f64,
-    targets: &PrintedMargins,
-) -> Option<f64> {
-    let gains = PidGains {
-        kp_v_per_mm,
-        ki_v_per_mm_s: 0.0,
-        kd_v_s_per_mm,
-        derivative_filter_s,
-    };
-    let process = Process::Model(*plant);
-    largest_integral_gain_where(&process, Form::Continuous, &gains, |margins| {
-        targets.read(margins)
-    })
-}
 
 /// The largest Ki, V/(mm s), rounded down to two significant digits, up to which the loop is stable and its
 /// margins are acceptable without interruption; nothing when they are not even without integral action. The Ki in
@@ -166,49 +85,14 @@ fn round_down_to_two_digits(value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::fixtures::{FILTER_S, X_GAINS, X_PLANT};
-    use quadrant_sim::loop_shape::ContinuousLoop;
-    use quadrant_sim::margins::margins;
-
-    fn margins_with(ki_v_per_mm_s: f64) -> Margins {
-        let gains = PidGains {
-            ki_v_per_mm_s,
-            ..X_GAINS
-        };
-        margins(&ContinuousLoop {
-            plant: X_PLANT,
-            gains,
-        })
-        .unwrap()
-    }
-
-    #[test]
-    fn x_axis_keeps_its_printed_margins_up_to_the_integral_gain_found() {
-        let (kp, kd) = (X_GAINS.kp_v_per_mm, X_GAINS.kd_v_s_per_mm);
-        let printed = PrintedMargins::THESIS_X;
-        let ki = largest_integral_gain(&X_PLANT, kp, kd, FILTER_S, &printed).unwrap();
-        assert_eq!(ki, 0.74);
-        assert!(printed.read(&margins_with(ki)));
-        assert!(!printed.read(&margins_with(ki + 0.01)));
-    }
-
-    #[test]
-    fn what_limits_the_integral_gain_is_the_printed_crossover_frequency() {
-        let printed = PrintedMargins::THESIS_X;
-        let beyond = margins_with(0.75);
-        assert!(!printed.gain_crossover_hz.reads(beyond.gain_crossover_hz));
-        assert!(printed.gain_margin_db.reads(beyond.gain_margin_db));
-        assert!(printed.phase_crossover_hz.reads(beyond.phase_crossover_hz));
-        assert!(printed.phase_margin_deg.reads(beyond.phase_margin_deg));
-    }
+    use crate::design::fixtures::{X_GAINS, X_PLANT};
 
     #[test]
     fn margins_missed_without_integral_action_have_no_integral_gain() {
-        let printed = PrintedMargins::THESIS_X;
-        assert_eq!(
-            largest_integral_gain(&X_PLANT, 2.0, 0.0055, FILTER_S, &printed),
-            None
-        );
+        let process = Process::Model(X_PLANT);
+        let never = |_: &Margins| false;
+        let found = largest_integral_gain_where(&process, Form::Continuous, &X_GAINS, never);
+        assert_eq!(found, None);
     }
 
     #[test]

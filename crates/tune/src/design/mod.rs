@@ -20,16 +20,11 @@ mod shaping;
 pub mod step_response;
 pub mod time_varying;
 
-#[cfg(test)]
-mod time_domain;
-
 pub use best::{
     COMPLEMENTARY_PEAK, SENSITIVITY_PEAK, best_pid, load_step_error, set_best_pid, with_best_pid,
 };
 pub use form::Form;
-pub use integral_gain::{
-    Printed, PrintedMargins, largest_integral_gain, largest_integral_gain_where,
-};
+pub use integral_gain::largest_integral_gain_where;
 pub use modal::{ModalDesign, modal_pid};
 pub use noise::noise_voltage_v;
 pub use pid::{DesignError, INTEGRAL_SHARE, PidDesign, PidRequest, Target, design_pid};

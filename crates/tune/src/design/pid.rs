@@ -89,7 +89,6 @@ pub enum DesignError {
          crossover, or the phase margin"
     )]
     GainMargin {
-        /// The crossover, Hz.
         crossover_hz: f64,
         /// Margin left, dB.
         found_db: f64,

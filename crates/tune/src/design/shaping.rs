@@ -25,7 +25,6 @@ pub enum ShapingError {
     },
     /// At the crossover asked for, no ratio of the gains has the phase margin: they lie between these.
     CrossoverOutOfReach {
-        /// The crossover, Hz.
         crossover_hz: f64,
         /// Phase margin with proportional gain alone, deg.
         proportional_deg: f64,

@@ -63,7 +63,6 @@ pub struct StepProperties {
     pub overshoot_percent: f64,
     /// From when on the position stays within 2 % of the height, s.
     pub settling_time_s: f64,
-    /// The largest voltage, V.
     pub largest_voltage_v: f64,
 }
 

@@ -71,7 +71,6 @@ pub enum CharacteristicError {
         "the axis still moves at {velocity_mm_s:.2} mm/s at the end of a pass: let it coast for longer than {coast_s} s"
     )]
     Coasting {
-        /// Velocity, mm/s.
         velocity_mm_s: f64,
         /// Time given to coast, s.
         coast_s: f64,

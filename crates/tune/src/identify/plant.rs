@@ -98,9 +98,7 @@ impl PlantFit {
 pub struct BandMisfit {
     /// Lowest and highest frequency, Hz.
     pub band_hz: (f64, f64),
-    /// Of the gain, dB.
     pub gain_db: f64,
-    /// Of the phase, deg.
     pub phase_deg: f64,
 }
 

@@ -80,9 +80,7 @@ pub struct Revision {
 /// Distance of a response from the measured one: RMS over the lines that count.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Misfit {
-    /// Of the gain, dB.
     pub gain_db: f64,
-    /// Of the phase, deg.
     pub phase_deg: f64,
 }
 

@@ -13,15 +13,12 @@ pub enum RecordError {
     /// The file cannot be opened or read.
     #[error("cannot read {}", path.display())]
     Read {
-        /// Path of the file.
         path: PathBuf,
-        /// The error that caused this.
         source: std::io::Error,
     },
     /// The file is no CSV: rows of different length, or bytes that are no text.
     #[error("{}: {message}", path.display())]
     Malformed {
-        /// Path of the file.
         path: PathBuf,
         /// Description of the fault and its place.
         message: String,
@@ -32,7 +29,6 @@ pub enum RecordError {
          position_mm, and voltage_v{hint}", path.display()
     )]
     MissingColumn {
-        /// Path of the file.
         path: PathBuf,
         /// The column, or its alternatives.
         needed: &'static str,
@@ -44,7 +40,6 @@ pub enum RecordError {
     /// Two columns claim to be the same quantity.
     #[error("{}: columns {first} and {second} both hold the {quantity}; keep one", path.display())]
     AmbiguousColumn {
-        /// Path of the file.
         path: PathBuf,
         /// Quantity that they hold.
         quantity: &'static str,
@@ -56,11 +51,9 @@ pub enum RecordError {
     /// A cell is not a finite number.
     #[error("{}, line {line}, column {column}: {value:?} is not {expected}", path.display())]
     Cell {
-        /// Path of the file.
         path: PathBuf,
         /// Line number; the header is 1.
         line: u64,
-        /// Name of the column.
         column: String,
         /// The cell as it stands.
         value: String,
@@ -70,9 +63,7 @@ pub enum RecordError {
     /// A column holds nothing that could be identified from.
     #[error("{}, column {column}: {fault}", path.display())]
     Useless {
-        /// Path of the file.
         path: PathBuf,
-        /// Name of the column.
         column: &'static str,
         /// Description of the fault.
         fault: UnusableSignal,
@@ -82,9 +73,7 @@ pub enum RecordError {
         "{}, column {column}: {found} values, and {expected} positions; every sample has one of each", path.display()
     )]
     Lengths {
-        /// Path of the file.
         path: PathBuf,
-        /// Name of the column.
         column: &'static str,
         /// Number of its values.
         found: usize,
@@ -94,7 +83,6 @@ pub enum RecordError {
     /// There is no motion in so little.
     #[error("{}: {rows} rows of data; at least {MIN_ROWS} are needed", path.display())]
     TooFewRows {
-        /// Path of the file.
         path: PathBuf,
         /// Rows after the header.
         rows: usize,
@@ -102,7 +90,6 @@ pub enum RecordError {
     /// More than the memory that may be used.
     #[error("{}: more than {most_rows} rows of data; split the recording, or keep every tenth row of a slow one", path.display())]
     TooManyRows {
-        /// Path of the file.
         path: PathBuf,
         /// Rows that are allowed.
         most_rows: usize,
@@ -110,7 +97,6 @@ pub enum RecordError {
     /// Time does not run as a clock does.
     #[error("{}, line {line}, column t_s: {value} s {fault}", path.display())]
     Time {
-        /// Path of the file.
         path: PathBuf,
         /// Line number; the header is 1.
         line: u64,
@@ -126,7 +112,6 @@ pub enum RecordError {
         path.display(), Others(*others)
     )]
     Jump {
-        /// Path of the file.
         path: PathBuf,
         /// Line number; the header is 1.
         line: u64,
@@ -143,7 +128,6 @@ pub enum RecordError {
         path.display(), Brief(*sample_time_s), Brief(*rate_hz), Brief(*least_hz)
     )]
     SampleRate {
-        /// Path of the file.
         path: PathBuf,
         /// Median time from row to row.
         sample_time_s: f64,
@@ -157,9 +141,7 @@ pub enum RecordError {
     /// Numbers that the axis cannot have made, or not in this unit.
     #[error("{}, column {column}: {fault}", path.display())]
     Unit {
-        /// Path of the file.
         path: PathBuf,
-        /// Name of the column.
         column: String,
         /// Contradiction that was found.
         fault: UnitFault,

@@ -24,12 +24,7 @@ pub enum TraceError {
     },
     /// The file cannot be written.
     #[error("cannot write {}", path.display())]
-    Write {
-        /// Path of the file.
-        path: PathBuf,
-        /// The error that caused this.
-        source: io::Error,
-    },
+    Write { path: PathBuf, source: io::Error },
 }
 
 /// Writes named columns of one length, every number in full, so that reading them back gives the same bits.

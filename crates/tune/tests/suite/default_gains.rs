@@ -5,10 +5,9 @@ use quadrant_settings::presets::{x_axis, y_axis, z_axis};
 use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::loop_shape::ContinuousLoop;
 use quadrant_sim::margins::{Margins, margins};
-use quadrant_tune::design::{
-    Form, PrintedMargins, Process, largest_integral_gain, largest_integral_gain_where,
-    shape_to_margins,
-};
+use quadrant_tune::design::{Form, Process, largest_integral_gain_where, shape_to_margins};
+
+use crate::printed_margins::PrintedMargins;
 
 fn loop_margins(axis: &AxisSettings) -> Margins {
     margins(&ContinuousLoop {
@@ -27,14 +26,22 @@ fn x_has_the_margins_that_the_thesis_prints() {
 fn the_integral_gain_of_x_is_the_largest_that_leaves_them_as_printed() {
     let x = x_axis();
     let pid = x.feedback.pid;
-    let largest = largest_integral_gain(
-        &x.plant.unwrap(),
-        pid.kp_v_per_mm,
-        pid.kd_v_s_per_mm,
-        pid.derivative_filter_s,
-        &PrintedMargins::THESIS_X,
-    );
+    let process = Process::Model(x.plant.unwrap());
+    let largest = largest_integral_gain_where(&process, Form::Continuous, &pid, |margins| {
+        PrintedMargins::THESIS_X.read(margins)
+    });
     assert_eq!(largest, Some(pid.ki_v_per_mm_s));
+}
+
+#[test]
+fn what_limits_the_integral_gain_of_x_is_the_printed_crossover_frequency() {
+    let mut x = x_axis();
+    x.feedback.pid.ki_v_per_mm_s += 0.01;
+    let (printed, beyond) = (PrintedMargins::THESIS_X, loop_margins(&x));
+    assert!(!printed.gain_crossover_hz.reads(beyond.gain_crossover_hz));
+    assert!(printed.gain_margin_db.reads(beyond.gain_margin_db));
+    assert!(printed.phase_crossover_hz.reads(beyond.phase_crossover_hz));
+    assert!(printed.phase_margin_deg.reads(beyond.phase_margin_deg));
 }
 
 #[test]

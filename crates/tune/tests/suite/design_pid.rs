@@ -10,10 +10,12 @@ use quadrant_sim::margins::MarginError;
 use quadrant_tune::design::measured::{MeasuredError, MeasuredResponse};
 use quadrant_tune::design::step_response::{StepRequest, step_response};
 use quadrant_tune::design::{
-    DesignError, Form, INTEGRAL_SHARE, PidDesign, PidRequest, PrintedMargins, Process,
-    ShapingError, Target, design_pid,
+    DesignError, Form, INTEGRAL_SHARE, PidDesign, PidRequest, Process, ShapingError, Target,
+    design_pid,
 };
 use quadrant_tune::identify::response::{FrequencyResponse, ResponsePoint};
+
+use crate::printed_margins::PrintedMargins;
 
 const SAMPLED: Form = Form::Sampled {
     sample_time_s: 1e-4,

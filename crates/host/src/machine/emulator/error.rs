@@ -15,13 +15,11 @@ pub enum EmulatorError {
     Image {
         /// Path that was read.
         path: PathBuf,
-        /// The error that caused this.
         source: io::Error,
     },
     /// The file is no image for an Arm microcontroller.
     #[error("{} is no image of the firmware: {reason}; give the ELF file of `cargo xtask build --board mps2`", path.display())]
     NoImage {
-        /// Path of the file.
         path: PathBuf,
         /// Description of the fault.
         reason: String,
@@ -36,7 +34,6 @@ pub enum EmulatorError {
     Io {
         /// Action that failed, in words.
         what: String,
-        /// The error that caused this.
         source: io::Error,
     },
     /// A job is larger than the shared memory's room for it.

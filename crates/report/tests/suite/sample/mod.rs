@@ -1,8 +1,8 @@
 //! Pages that have everything a page can have.
 
 use quadrant_report::{
-    Band, Block, Cell, Colour, Column, DeviationTrace, DotSeries, Dots, Figure, Lines, Page, Plot,
-    PolarDeviation, Provenance, Scale, Section, Series, Spread, Style, Table,
+    Block, Cell, Colour, Column, DeviationTrace, Figure, Lines, Page, Plot, PolarDeviation,
+    Provenance, Scale, Section, Series, Style, Table,
 };
 
 pub(crate) fn lines(id: &str, series: usize, samples: usize) -> Figure {
@@ -91,7 +91,7 @@ pub(crate) fn sample() -> Page {
     ])
 }
 
-/// A response on decades, with a band around it and a gap in it.
+/// A response on decades, with a gap in it.
 pub(crate) fn response() -> Figure {
     let x: Vec<f64> = (0..300).map(|i| 10f64.powf(f64::from(i) / 100.0)).collect();
     let mut y: Vec<f64> = x
@@ -99,13 +99,6 @@ pub(crate) fn response() -> Figure {
         .map(|f| 1.0 / (1.0 + f * f / 900.0).sqrt())
         .collect();
     y[120] = f64::NAN;
-    let band = Band {
-        name: "95 % of all".into(),
-        x: x.clone(),
-        low: y.iter().map(|y| 0.8 * y).collect(),
-        high: y.iter().map(|y| 1.25 * y).collect(),
-        colour: Colour::Sky,
-    };
     let series = [
         Style::points(Colour::Ink),
         Style::dashed(Colour::Vermillion),
@@ -122,42 +115,11 @@ pub(crate) fn response() -> Figure {
         x_scale: Scale::Logarithmic,
         y_scale: Scale::Logarithmic,
         series: series.into(),
-        bands: vec![band],
         ..Lines::default()
     });
     Figure {
         id: "response".into(),
         caption: "Response.".into(),
-        plot,
-    }
-}
-
-pub(crate) fn dots() -> Figure {
-    let series = |name: &str, factor: f64, colour| DotSeries {
-        name: name.into(),
-        values: vec![
-            Spread::over(&[10.0 * factor, 12.0 * factor, 17.0 * factor]),
-            Spread::exact(3.0 * factor),
-            Spread::over(&[]),
-        ],
-        colour,
-    };
-    let plot = Plot::Dots(Dots {
-        value_label: "glitch (um)".into(),
-        categories: vec![
-            "PID".into(),
-            "N-PID with static and GMS friction feedforward".into(),
-            "not run".into(),
-        ],
-        series: vec![
-            series("<matched>", 1.0, Colour::Blue),
-            series("virtual machine", 1.4, Colour::Vermillion),
-        ],
-        scale: Scale::Linear,
-    });
-    Figure {
-        id: "dots".into(),
-        caption: "Glitch over three seeds; bars from the least to the greatest.".into(),
         plot,
     }
 }
@@ -176,7 +138,6 @@ pub(crate) fn full() -> Page {
         prose: vec!["Another command made this.".into()],
         blocks: vec![
             Block::Figure(response()),
-            Block::Figure(dots()).labelled("Figure 5.7"),
             Block::Table(table("labelled")).labelled("Table 5.7"),
         ],
     });

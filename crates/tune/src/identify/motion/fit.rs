@@ -68,9 +68,7 @@ impl Errors {
 /// Voltage explained by a fit, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rows {
-    /// Time, s.
     pub time_s: Vec<f64>,
-    /// Velocity, mm/s.
     pub velocity_mm_s: Vec<f64>,
     /// Voltage that was commanded a dead time before, V.
     pub voltage_v: Vec<f64>,

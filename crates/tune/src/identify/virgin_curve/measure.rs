@@ -11,7 +11,6 @@ pub struct VirginCurveSettings {
     /// Amplitude of the reference, mm: it must carry the axis through its pre-sliding range and, before that, the
     /// controller to the voltage at which the axis breaks away.
     pub amplitude_mm: f64,
-    /// Frequency, Hz.
     pub frequency_hz: f64,
     /// Cycles at full speed.
     pub cycles: f64,

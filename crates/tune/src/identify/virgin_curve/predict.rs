@@ -12,7 +12,6 @@ use crate::identify::latest::Latest;
 /// Measured and predicted hysteresis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Prediction {
-    /// Position, mm.
     pub position_mm: Vec<f64>,
     /// Voltage measured, V.
     pub measured_v: Vec<f64>,

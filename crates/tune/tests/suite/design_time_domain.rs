@@ -4,14 +4,22 @@ use proptest::prelude::*;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::control::plant_model::PlantModel;
 use quadrant_settings::popov::sector_bound;
+use quadrant_settings::presets::{X_PLANT, Y_PLANT, Z_PLANT};
 use quadrant_sim::loop_shape::{ContinuousLoop, SampledLoop};
 use quadrant_sim::margins::margins;
+use quadrant_tune::design::{Form, Process, ShapingError, noise_voltage_v, shape_to_margins};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::fixtures::{FILTER_S, X_GAINS, X_PLANT, Y_PLANT, Z_PLANT};
-use super::{Form, Process, ShapingError, noise_voltage_v, shape_to_margins};
-
+/// The derivative filter of all axes, s.
+const FILTER_S: f64 = 52e-6;
+/// The proportional and derivative gains of the x axis, chosen with its plant.
+const X_GAINS: PidGains = PidGains {
+    kp_v_per_mm: 1.118,
+    ki_v_per_mm_s: 0.0,
+    kd_v_s_per_mm: 0.005537,
+    derivative_filter_s: FILTER_S,
+};
 /// Control period of these tests, s.
 const PERIOD_S: f64 = 1e-4;
 
