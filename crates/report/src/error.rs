@@ -49,6 +49,12 @@ pub enum ReportError {
         /// The radius given.
         radius_mm: f64,
     },
+    /// An image that cannot be drawn.
+    #[error("the image cannot be drawn: {reason}")]
+    Image {
+        /// Reason.
+        reason: String,
+    },
     /// The file could not be written.
     #[error("cannot write {}", path.display())]
     Write {
@@ -57,4 +63,12 @@ pub enum ReportError {
         /// Cause.
         source: std::io::Error,
     },
+}
+
+impl ReportError {
+    pub(super) fn image(reason: impl std::fmt::Display) -> Self {
+        Self::Image {
+            reason: reason.to_string(),
+        }
+    }
 }
