@@ -23,7 +23,7 @@ const LOADED: u32 = 1_500;
 const TICKS: u32 = 200;
 /// Cost of taking a request of the operator to its queue, instructions: the emulated board's own way in, which is
 /// counted here because a real one would cost as much.
-const REQUEST: i64 = 25;
+const REQUEST: i64 = 26;
 
 /// Load on the firmware.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
