@@ -170,26 +170,7 @@ impl Commissioned {
 fn verdict(trials: &Verification) -> Vec<String> {
     let chosen = trials.chosen();
     let (worst, mean) = trials.against_pid(chosen);
-    let refused = trials.refused.as_ref().map(|refused| {
-        let Refused { law, worst } = refused;
-        let seen = worst.map_or_else(
-            || "was stopped".to_owned(),
-            |WorseSine {
-                 sine,
-                 largest_mm,
-                 pid_mm,
-             }| {
-                format!(
-                    "leaves {:.1} um where the PID alone leaves {:.1} ({} mm at {} mm/s)",
-                    1e3 * largest_mm,
-                    1e3 * pid_mm,
-                    sine.amplitude_mm,
-                    sine.velocity_mm_s
-                )
-            },
-        );
-        format!("On small slow motions {law} {seen}: it is not chosen.")
-    });
+    let refused = trials.refused.iter().map(refusal);
     let choice = if trials.is_better_than_pid() {
         format!(
             "Chosen: {}, with {:.0} % of the PID's errors on the mean over {} sines, and {:.0} % at worst; on small slow motions it is no \
@@ -203,7 +184,27 @@ fn verdict(trials: &Verification) -> Vec<String> {
         "Nothing was better than the PID alone on every sine: the settings are those of the PID."
             .to_owned()
     };
-    refused.into_iter().chain([choice]).collect()
+    refused.chain([choice]).collect()
+}
+
+/// The reason why a law was not chosen, in a sentence.
+fn refusal(refused: &Refused) -> String {
+    let law = &refused.law;
+    let Some(worst) = refused.worst else {
+        return format!("On small slow motions {law} was stopped.");
+    };
+    let WorseSine {
+        sine,
+        largest_mm,
+        pid_mm,
+    } = worst;
+    format!(
+        "On small slow motions {law} is worse than the PID alone: {:.1} um for {:.1} ({} mm at {} mm/s).",
+        1e3 * largest_mm,
+        1e3 * pid_mm,
+        sine.amplitude_mm,
+        sine.velocity_mm_s
+    )
 }
 
 /// Pre-sliding range where none was identified, mm.

@@ -20,7 +20,7 @@ const MAX_RMS_RATIO: f64 = 0.85;
 /// Least error that the encoder resolves, counts.
 const RESOLVED_COUNTS: f64 = 2.0;
 /// Largest excess of a largest error over the PID's that counts as none, counts.
-pub(super) const NEGLIGIBLE_COUNTS: f64 = 0.25;
+const NEGLIGIBLE_COUNTS: f64 = 0.25;
 /// The same of an RMS error, counts.
 const NEGLIGIBLE_RMS_COUNTS: f64 = 0.025;
 /// Largest factor on the friction that is fed forward.

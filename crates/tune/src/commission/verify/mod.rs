@@ -29,8 +29,8 @@ pub struct Verification {
     pub laws: Vec<LawResult>,
     /// Index of the chosen law.
     pub chosen: usize,
-    /// The law that was worse than the PID on a small slow sine, if the choice changed for it.
-    pub refused: Option<Refused>,
+    /// The laws that were worse than the PID on a small slow sine, in the order in which they ran.
+    pub refused: Vec<Refused>,
     /// Change of the axis meanwhile, on the first sine.
     pub drift: Drift,
 }
@@ -130,8 +130,8 @@ fn choose(bench: &mut Bench<'_>, settings: &AxisSettings) -> Result<Verification
     trials.refine_best_kind()?;
     trials.rescale()?;
     let chosen = trials.confirm()?;
-    let (chosen, refused) = trials.keep_small(chosen)?;
-    Ok(trials.ended(chosen, refused))
+    let chosen = trials.keep_small(chosen)?;
+    Ok(trials.ended(chosen))
 }
 
 /// Time that trials take where the first choice is not worse than the PID anywhere, s.

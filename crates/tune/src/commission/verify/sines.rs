@@ -62,9 +62,9 @@ const fn small(amplitude_mm: f64, velocity_mm_s: f64, scored_cycles: usize) -> S
     }
 }
 
-/// Small slow sines, on which no law is worse than the PID. What throws a table behind a spring depends on the frequency: the short ones
-/// are at 3 to 10 Hz, and many of their cycles count, for an axis that sticks does not do the same in each. The last one shows friction
-/// that is less at rest than what is fed forward.
+/// Small slow sines, on which no law may be worse than the PID. What throws a table behind a spring depends on the frequency: the short
+/// sines are at 3 to 10 Hz, and many of their cycles count, for an axis that sticks does not do the same in each. The last one is slow: it
+/// shows an axis that meets less friction at such a speed than is fed forward.
 pub(super) const SMALL_SINES: [SmallSine; 6] = [
     small(0.02, 1.2, 9),
     small(0.03, 0.9, 9),

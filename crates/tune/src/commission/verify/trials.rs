@@ -75,6 +75,8 @@ pub(super) struct Trials<'a, 'b> {
     kinds: Vec<LawResult>,
     /// The same that make the axis jump.
     jumping: Vec<LawResult>,
+    /// Laws that were worse than the PID on a small slow sine.
+    pub(super) refused: Vec<Refused>,
     pub(super) drift: Drift,
 }
 
@@ -113,6 +115,7 @@ impl<'a, 'b> Trials<'a, 'b> {
             laws,
             kinds: Vec::new(),
             jumping: Vec::new(),
+            refused: Vec::new(),
             drift,
         })
     }
@@ -286,7 +289,7 @@ impl<'a, 'b> Trials<'a, 'b> {
     }
 
     /// The result, with the law of an index.
-    pub(super) fn ended(mut self, chosen: usize, refused: Option<Refused>) -> Verification {
+    pub(super) fn ended(mut self, chosen: usize) -> Verification {
         // The others are shown, too, after those that ran on every sine.
         self.laws.append(&mut self.kinds);
         self.laws.append(&mut self.jumping);
@@ -294,7 +297,7 @@ impl<'a, 'b> Trials<'a, 'b> {
             sines: self.bench.sines.to_vec(),
             laws: self.laws,
             chosen,
-            refused,
+            refused: self.refused,
             drift: self.drift,
         }
     }

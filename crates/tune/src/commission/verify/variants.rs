@@ -1,6 +1,7 @@
 //! Settings of the laws that are tried: the commissioned ones with another feedforward.
 
 use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::friction::stribeck::StribeckCurve;
 use quadrant_settings::AxisSettings;
 
 /// The settings of a feedback, with the feedforward of `full` of a kind.
@@ -42,12 +43,41 @@ pub(super) fn over_range(settings: &AxisSettings, factor: f64) -> AxisSettings {
 
 /// The same settings with a level of friction that no speed changes: `share` of the lower one of the Coulomb and the breakaway level.
 pub(super) fn flattened(settings: &AxisSettings, share: f64) -> AxisSettings {
-    let mut flat = settings.clone();
-    let sliding = &mut flat.friction.sliding;
+    with_curves(settings, |curve| {
+        let level_v = share * curve.coulomb_v.min(curve.breakaway_v);
+        StribeckCurve {
+            coulomb_v: level_v,
+            breakaway_v: level_v,
+            ..curve
+        }
+    })
+}
+
+/// The same settings with the lower one of both levels, of which a `share` is left at rest; of the rest, 63 % is back at a speed.
+pub(super) fn lessened_when_slow(
+    settings: &AxisSettings,
+    share: f64,
+    speed_mm_s: f64,
+) -> AxisSettings {
+    with_curves(settings, |curve| {
+        let level_v = curve.coulomb_v.min(curve.breakaway_v);
+        StribeckCurve {
+            coulomb_v: level_v,
+            breakaway_v: share * level_v,
+            stribeck_velocity_mm_s: speed_mm_s,
+            exponent: 1.0,
+        }
+    })
+}
+
+fn with_curves(
+    settings: &AxisSettings,
+    change: impl Fn(StribeckCurve) -> StribeckCurve,
+) -> AxisSettings {
+    let mut changed = settings.clone();
+    let sliding = &mut changed.friction.sliding;
     for way in [&mut sliding.positive, &mut sliding.negative] {
-        let level_v = share * way.curve.coulomb_v.min(way.curve.breakaway_v);
-        way.curve.coulomb_v = level_v;
-        way.curve.breakaway_v = level_v;
+        way.curve = change(way.curve);
     }
-    flat
+    changed
 }
