@@ -170,7 +170,13 @@ impl Commissioned {
 fn verdict(trials: &Verification) -> Vec<String> {
     let chosen = trials.chosen();
     let (worst, mean) = trials.against_pid(chosen);
-    let refused = trials.refused.iter().map(refusal);
+    let refused: Vec<String> = trials.refused.iter().map(refusal).collect();
+    let refused = (!refused.is_empty()).then(|| {
+        format!(
+            "On small slow motions worse than the PID alone: {}.",
+            refused.join("; ")
+        )
+    });
     let choice = if trials.is_better_than_pid() {
         format!(
             "Chosen: {}, with {:.0} % of the PID's errors on the mean over {} sines, and {:.0} % at worst; on small slow motions it is no \
@@ -184,14 +190,14 @@ fn verdict(trials: &Verification) -> Vec<String> {
         "Nothing was better than the PID alone on every sine: the settings are those of the PID."
             .to_owned()
     };
-    refused.chain([choice]).collect()
+    refused.into_iter().chain([choice]).collect()
 }
 
-/// The reason why a law was not chosen, in a sentence.
+/// The reason why a law was not chosen.
 fn refusal(refused: &Refused) -> String {
     let law = &refused.law;
     let Some(worst) = refused.worst else {
-        return format!("On small slow motions {law} was stopped.");
+        return format!("{law} was stopped");
     };
     let WorseSine {
         sine,
@@ -199,7 +205,7 @@ fn refusal(refused: &Refused) -> String {
         pid_mm,
     } = worst;
     format!(
-        "On small slow motions {law} is worse than the PID alone: {:.1} um for {:.1} ({} mm at {} mm/s).",
+        "{law} leaves {:.1} um for {:.1} ({:.2} mm at {:.1} mm/s)",
         1e3 * largest_mm,
         1e3 * pid_mm,
         sine.amplitude_mm,

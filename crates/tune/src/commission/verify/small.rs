@@ -97,7 +97,7 @@ impl Remedy {
 impl Trials<'_, '_> {
     /// The chosen law's index where it is not worse than the PID on small slow sines, else that of one with less friction, or the PID's.
     /// Laws that ran on the usual sines are added.
-    pub(super) fn keep_small(&mut self, mut chosen: usize) -> Result<usize, VerifyError> {
+    pub(super) fn keep_small(&mut self, chosen: usize) -> Result<usize, VerifyError> {
         if chosen == 0 {
             return Ok(0);
         }
@@ -105,15 +105,18 @@ impl Trials<'_, '_> {
         // One that is stopped is refused.
         let _ = self.bench.run_small(&mut self.laws[chosen]);
         let law = self.laws[chosen].clone();
-        if self.refuses_when_small(&law) {
-            for remedy in REMEDIES {
-                chosen = self.try_remedy(remedy, &law)?;
-                if chosen != 0 {
-                    break;
-                }
+        if !self.refuses_when_small(&law) {
+            return Ok(chosen);
+        }
+        // Less of nothing is nothing.
+        let remedies = REMEDIES.iter().filter(|_| law.feeds_forward());
+        for remedy in remedies {
+            let found = self.try_remedy(*remedy, &law)?;
+            if found != 0 {
+                return Ok(found);
             }
         }
-        Ok(chosen)
+        Ok(0)
     }
 
     /// Runs a law with less friction; its index if it is chosen, else the PID's.
