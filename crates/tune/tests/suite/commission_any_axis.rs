@@ -87,7 +87,11 @@ fn a_law_is_not_refused_because_the_axis_warmed_before_it_was_tried() {
         without_drift > 1.01 && worst <= 1.01,
         "{without_drift} {worst}"
     );
-    assert!(verification.is_better_than_pid());
+    assert!(
+        verification.is_better_than_pid(),
+        "{:?}",
+        verification.refused
+    );
 }
 
 #[test]
