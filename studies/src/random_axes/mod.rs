@@ -184,7 +184,7 @@ const MOST_TRAVEL: f64 = 0.4;
 
 /// Sines that a result is judged on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Judging {
+pub enum Judging {
     /// The usual ones.
     Usual,
     /// The small slow ones, too: twenty times as many.
@@ -302,8 +302,8 @@ impl TestAxis for Timed<'_> {
 }
 
 /// Commissions the axis of a seed and judges the result.
-pub fn judge(seed: u64) -> Line {
-    judge_subject(&RandomAxis::new(seed).subject(), Path::of(seed))
+pub fn judge(seed: u64, judging: Judging) -> Line {
+    judged(&RandomAxis::new(seed).subject(), Path::of(seed), judging).line
 }
 
 /// Commissions an axis and judges the result.

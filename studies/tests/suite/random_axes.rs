@@ -1,7 +1,7 @@
 //! Commissioning of axes that nobody tuned it on.
 
 use quadrant_studies::random_axes::cases::cases;
-use quadrant_studies::random_axes::{Outcome, Path, RandomAxis, judge, judge_subject};
+use quadrant_studies::random_axes::{Judging, Outcome, Path, RandomAxis, judge, judge_subject};
 use quadrant_tune::test_axis::Travel;
 use rayon::prelude::*;
 
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 fn random_axes_are_commissioned_or_refused_within_their_travel_and_none_is_worse_than_its_pid() {
     let lines: Vec<_> = (1..=20)
         .into_par_iter()
-        .map(|seed| (seed, judge(seed)))
+        .map(|seed| (seed, judge(seed, Judging::Usual)))
         .collect();
     for (_, line) in &lines {
         println!("{line:?}");
@@ -34,6 +34,17 @@ fn random_axes_are_commissioned_or_refused_within_their_travel_and_none_is_worse
     assert!(
         rigid.all(|(_, line)| [Outcome::Commissioned, Outcome::PidAlone].contains(&line.outcome))
     );
+}
+
+/// Their tables are behind springs of 94 and 41 Hz, and the whole of their friction, fed forward, throws them.
+#[test]
+fn feedforward_that_throws_a_small_slow_motion_is_not_chosen_and_less_of_it_is() {
+    [12, 13].into_par_iter().for_each(|seed| {
+        let line = judge(seed, Judging::SmallToo);
+        println!("{line:?}");
+        assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
+        assert!(line.mean_ratio.unwrap() < 0.3, "{line:?}");
+    });
 }
 
 #[test]
@@ -99,7 +110,7 @@ fn axes_with_short_travels_are_commissioned_over_the_firmwares_path() {
 #[test]
 fn axes_that_hang_or_run_away_stay_within_their_travel() {
     [11402, 11225, 14099].into_par_iter().for_each(|seed| {
-        let line = judge(seed);
+        let line = judge(seed, Judging::Usual);
         println!("{line:?}");
         assert_ne!(line.outcome, Outcome::LeftTravel, "{line:?}");
     });
@@ -109,7 +120,7 @@ fn axes_that_hang_or_run_away_stay_within_their_travel() {
 #[test]
 fn axes_whose_pid_oscillates_while_friction_holds_them_get_a_softer_one_and_are_commissioned() {
     [13044, 13366].into_par_iter().for_each(|seed| {
-        let line = judge(seed);
+        let line = judge(seed, Judging::Usual);
         println!("{line:?}");
         assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
         assert!(line.mean_ratio.unwrap() < 0.3, "{line:?}");
@@ -120,7 +131,7 @@ fn axes_whose_pid_oscillates_while_friction_holds_them_get_a_softer_one_and_are_
 /// false alarm on it.
 #[test]
 fn an_axis_on_which_the_best_law_is_refused_gets_the_next() {
-    let line = judge(18780);
+    let line = judge(18780, Judging::Usual);
     assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
     assert!(line.mean_ratio.unwrap() < 0.6, "{line:?}");
 }

@@ -4,7 +4,7 @@ use quadrant_settings::AxisSettings;
 use quadrant_sim::margins::{MarginError, Margins};
 
 use super::guard::Run;
-use super::verify::Verification;
+use super::verify::{Refused, Verification, WorseSine};
 use crate::design::Target;
 use crate::identify::frf::FrfMeasurement;
 use crate::identify::motor_constant::MotorConstant;
@@ -143,21 +143,7 @@ impl Commissioned {
                 1e3 * ASSUMED_RANGE_MM
             )),
         }
-        if let Some(verification) = &self.verification {
-            notes.push(if verification.is_better_than_pid() {
-                let chosen = verification.chosen();
-                let (worst, mean) = verification.against_pid(chosen);
-                format!(
-                    "Chosen: {}, with {:.0} % of the PID's errors on the mean over {} sines, and {:.0} % at worst.",
-                    chosen.law,
-                    100.0 * mean,
-                    verification.sines.len(),
-                    100.0 * worst
-                )
-            } else {
-                "Nothing was better than the PID alone on every sine: the settings are those of the PID.".to_owned()
-            });
-        }
+        notes.extend(self.verification.iter().flat_map(verdict));
         notes
     }
 
@@ -178,6 +164,53 @@ impl Commissioned {
             )
         })
     }
+}
+
+/// What the trials chose, in sentences.
+fn verdict(trials: &Verification) -> Vec<String> {
+    let chosen = trials.chosen();
+    let (worst, mean) = trials.against_pid(chosen);
+    let refused: Vec<String> = trials.refused.iter().map(refusal).collect();
+    let refused = (!refused.is_empty()).then(|| {
+        format!(
+            "On small slow motions worse than the PID alone: {}.",
+            refused.join("; ")
+        )
+    });
+    let choice = if trials.is_better_than_pid() {
+        format!(
+            "Chosen: {}, with {:.0} % of the PID's errors on the mean over {} sines, and {:.0} % at worst; on small slow motions it is no \
+             worse.",
+            chosen.law,
+            100.0 * mean,
+            trials.sines.len(),
+            100.0 * worst
+        )
+    } else {
+        "Nothing was better than the PID alone on every sine: the settings are those of the PID."
+            .to_owned()
+    };
+    refused.into_iter().chain([choice]).collect()
+}
+
+/// The reason why a law was not chosen.
+fn refusal(refused: &Refused) -> String {
+    let law = &refused.law;
+    let Some(worst) = refused.worst else {
+        return format!("{law} was stopped");
+    };
+    let WorseSine {
+        sine,
+        largest_mm,
+        pid_mm,
+    } = worst;
+    format!(
+        "{law} leaves {:.1} um for {:.1} ({:.2} mm at {:.1} mm/s)",
+        1e3 * largest_mm,
+        1e3 * pid_mm,
+        sine.amplitude_mm,
+        sine.velocity_mm_s
+    )
 }
 
 /// Pre-sliding range where none was identified, mm.

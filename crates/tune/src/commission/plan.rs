@@ -100,7 +100,7 @@ pub fn plan(info: &AxisInfo, request: &CommissionSettings) -> Vec<Planned> {
             within_mm: widest_mm.fold(0.0, f64::max),
             fastest_mm_s: Some(fastest.fold(0.0, f64::max)),
             volts: "the laws'".to_owned(),
-            lasts_s: verify::lasts_s(&sines),
+            lasts_s: verify::lasts_s(info),
         });
     }
     planned

@@ -1,0 +1,149 @@
+//! The axis that laws run on, one sine after the other.
+
+use quadrant_settings::AxisSettings;
+use quadrant_sim::metrics::Score;
+use quadrant_sim::sine_test::SineTest;
+
+use super::super::bootstrap::measuring_settings;
+use super::super::ringing::{Ringing, lasting};
+use super::VerifyError;
+use super::law_result::LawResult;
+use super::sines::{SCORED_CYCLES, SmallSine, one_lasts_s, run_cycles};
+use crate::record::Recording;
+use crate::test_axis::{ExperimentError, MachineError, TestAxis, approach};
+
+/// Amplitude over the RMS error from which on an oscillation is most of the error: a reversal is followed by one, too, but it decays.
+const MIN_DOMINANT_RATIO: f64 = 1.0;
+
+/// The axis that laws run on.
+pub(super) struct Bench<'a> {
+    pub(super) test_axis: &'a mut dyn TestAxis,
+    pub(super) sines: &'a [SineTest],
+    pub(super) small_sines: &'a [SmallSine],
+    pub(super) progress: &'a mut dyn FnMut(f64),
+    /// Runs that were made, and that are made at most.
+    pub(super) done: usize,
+    pub(super) most_runs: usize,
+    /// Time for which the axis has run on sines, s.
+    pub(super) used_s: f64,
+    /// True while oscillations are looked for, which takes longer than anything else here: of the PID alone.
+    pub(super) detects_ringing: bool,
+    /// The interruption by a person, after which nothing more runs.
+    pub(super) interrupted: Option<ExperimentError>,
+}
+
+impl Bench<'_> {
+    /// A law on the first sines; stops where the axis is stopped. Settings that are refused are an error.
+    pub(super) fn try_law(
+        &mut self,
+        law: &str,
+        settings: &AxisSettings,
+        count: usize,
+    ) -> Result<(LawResult, Option<ExperimentError>), MachineError> {
+        let mut settings = settings.clone();
+        // Room for the error that a poor law makes, as for the PID.
+        let measuring = measuring_settings(&settings);
+        settings.limits = measuring.limits;
+        self.test_axis.apply(&settings)?;
+        let mut result = LawResult {
+            law: law.to_owned(),
+            scores: Vec::new(),
+            recording: Recording::default(),
+            stopped: None,
+            rings: Vec::new(),
+            is_share: false,
+            at_s: Vec::new(),
+            small: Vec::new(),
+            settings,
+        };
+        let stopped = self.run(&mut result, count);
+        Ok((result, stopped))
+    }
+
+    /// Runs a law that was not stopped on those of the first sines that it has not run on; the error that stops it.
+    pub(super) fn run_on(
+        &mut self,
+        result: &mut LawResult,
+        count: usize,
+    ) -> Option<ExperimentError> {
+        if result.stopped.is_some() || self.test_axis.apply(&result.settings).is_err() {
+            return None;
+        }
+        self.run(result, count)
+    }
+
+    /// The same of one that was just put into force.
+    fn run(&mut self, result: &mut LawResult, count: usize) -> Option<ExperimentError> {
+        for index in result.scores.len()..count {
+            let sine = self.sines[index];
+            let (score, recording) = match self.run_one(result, sine, SCORED_CYCLES) {
+                Ok(ran) => ran?,
+                Err(stopped) => return Some(stopped),
+            };
+            result.scores.push(score);
+            result.at_s.push(self.used_s);
+            if self.detects_ringing {
+                let found = lasting(&recording, result.settings.encoder.resolution_mm);
+                let is_all =
+                    |found: &Ringing| found.amplitude_mm > MIN_DOMINANT_RATIO * score.rms_mm;
+                result.rings.extend(found.filter(is_all));
+            }
+            if index == 0 {
+                result.recording = recording;
+            }
+        }
+        None
+    }
+
+    /// Runs a law that was not stopped on the small slow sines, as far as it has not run on them.
+    ///
+    /// # Errors
+    /// A run that is stopped, and settings that are refused.
+    pub(super) fn run_small(&mut self, result: &mut LawResult) -> Result<(), VerifyError> {
+        if result.stopped.is_some() {
+            return Ok(());
+        }
+        self.test_axis.apply(&result.settings)?;
+        let small_sines = self.small_sines;
+        for small in &small_sines[result.small.len()..] {
+            if let Some((score, _)) = self.run_one(result, small.sine, small.scored_cycles)? {
+                result.small.push(score);
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs the law in force on a sine; nothing where a person has ended the trials. The error that stops it is kept.
+    fn run_one(
+        &mut self,
+        result: &mut LawResult,
+        sine: SineTest,
+        scored_cycles: usize,
+    ) -> Result<Option<(Score, Recording)>, ExperimentError> {
+        if self.interrupted.is_some() {
+            return Ok(None);
+        }
+        let (done, most) = (self.done as f64, self.most_runs as f64);
+        let progress = &mut *self.progress;
+        let mut report = |share: f64| progress(((done + share) / most).min(1.0));
+        let outcome = approach(self.test_axis, 0.0).and_then(|()| {
+            let law = &result.law;
+            run_cycles(self.test_axis, law, sine, scored_cycles, &mut report)
+        });
+        self.done += 1;
+        match outcome {
+            Ok(ran) => {
+                self.used_s += one_lasts_s(&sine, scored_cycles);
+                Ok(Some(ran))
+            }
+            Err(error @ ExperimentError::Interrupted { .. }) => {
+                self.interrupted = Some(error);
+                Ok(None)
+            }
+            Err(error) => {
+                result.stopped = Some(error.to_string());
+                Err(error)
+            }
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! Trials of the commissioned laws on the axis itself, by its own encoder, and the choice among them: no law is selected
+//! that is worse than the PID alone on any of the sines, on those that no law was chosen by, or on small slow ones.
+
+mod bench;
+mod law_result;
+mod sines;
+mod small;
+mod trials;
+mod variants;
+
+use quadrant_settings::AxisSettings;
+use quadrant_sim::sine_test::SineTest;
+
+use self::bench::Bench;
+pub use self::law_result::LawResult;
+use self::sines::{CHOICE_SINES, COMPARISON_SINES, SCORED_CYCLES, one_lasts_s, small_sines};
+pub use self::sines::{run_sine, sines};
+pub use self::small::{Refused, WorseSine};
+use self::trials::{KINDS, MOST_RUNS, REPEATS, Trials};
+use super::drift::Drift;
+use super::ringing::Ringing;
+use crate::test_axis::{AxisInfo, ExperimentError, MachineError, TestAxis};
+
+/// All trials, and the chosen law.
+#[derive(Clone, Debug)]
+pub struct Verification {
+    pub sines: Vec<SineTest>,
+    /// The PID alone first.
+    pub laws: Vec<LawResult>,
+    /// Index of the chosen law.
+    pub chosen: usize,
+    /// The laws that were worse than the PID on a small slow sine, in the order in which they ran.
+    pub refused: Vec<Refused>,
+    /// Change of the axis meanwhile, on the first sine.
+    pub drift: Drift,
+}
+
+impl Verification {
+    /// True if a law was found that is better than the PID alone by enough, and nowhere worse.
+    pub fn is_better_than_pid(&self) -> bool {
+        self.chosen != 0
+    }
+
+    pub fn chosen(&self) -> &LawResult {
+        &self.laws[self.chosen]
+    }
+
+    /// Errors of one of the laws over those that the PID would have made at the same time: the largest of all ratios, and their
+    /// geometric mean, over the sines that the law ran on; infinite for one that was stopped.
+    pub fn against_pid(&self, law: &LawResult) -> (f64, f64) {
+        law.against(&self.laws[0], &self.drift)
+    }
+
+    /// Settings of the chosen law, with the limits of `base`.
+    pub fn settings(&self, base: &AxisSettings) -> AxisSettings {
+        AxisSettings {
+            limits: base.limits,
+            ..self.chosen().settings.clone()
+        }
+    }
+}
+
+/// Reason why the trials cannot be run.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// The machine did not take the settings.
+    #[error(transparent)]
+    Machine(#[from] MachineError),
+    /// The PID alone was stopped.
+    #[error(transparent)]
+    TestAxis(#[from] ExperimentError),
+    /// The PID alone oscillates.
+    #[error(
+        "The PID oscillates at {:.0} Hz ({:.1} um), in every motion of the axis",
+        .0.frequency_hz,
+        1e3 * .0.amplitude_mm
+    )]
+    Rings(Ringing),
+}
+
+impl VerifyError {
+    /// True if a softer PID may do: this one oscillates, or does not hold the axis.
+    pub(super) fn asks_for_softer(&self) -> bool {
+        match self {
+            Self::Machine(_) => false,
+            Self::TestAxis(error) => error.strayed(),
+            Self::Rings(_) => true,
+        }
+    }
+}
+
+/// Tries laws on the axis: the PID alone, the N-PID alone, the N-PID with every kind of feedforward that was identified, the best of
+/// them over other ranges of pre-sliding displacement, less of it where it is worse than the PID anywhere, and as much of the best as its
+/// errors ask for. Chooses the best of those that are not worse, on sines either that were withheld until then. Where there is none, other
+/// kinds and shares take their turn, and then what was tried, without the nonlinear gain. One that is worse on small slow sines is replaced by
+/// less of it, or by the PID alone.
+///
+/// # Errors
+/// A PID whose settings are refused, that is stopped, or that oscillates.
+pub fn verify(
+    test_axis: &mut dyn TestAxis,
+    settings: &AxisSettings,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Verification, VerifyError> {
+    let info = test_axis.info();
+    let (sines, small_sines) = (sines(&info), small_sines(&info));
+    let mut bench = Bench {
+        test_axis,
+        sines: &sines,
+        small_sines: &small_sines,
+        progress,
+        done: 0,
+        most_runs: MOST_RUNS,
+        used_s: 0.0,
+        detects_ringing: true,
+        interrupted: None,
+    };
+    let verdict = choose(&mut bench, settings);
+    match bench.interrupted {
+        // Laws that a person kept from running are no worse for it.
+        Some(error) => Err(error.into()),
+        None => verdict,
+    }
+}
+
+/// [`verify`], unless a person ends it.
+fn choose(bench: &mut Bench<'_>, settings: &AxisSettings) -> Result<Verification, VerifyError> {
+    let mut trials = Trials::begin(bench, settings)?;
+    trials.compare_kinds()?;
+    trials.refine_best_kind()?;
+    trials.rescale()?;
+    let chosen = trials.confirm()?;
+    let chosen = trials.keep_small(chosen)?;
+    Ok(trials.ended(chosen))
+}
+
+/// Time that trials take where the first choice is not worse than the PID anywhere, s.
+pub(super) fn lasts_s(info: &AxisInfo) -> f64 {
+    let runs = |index: usize| {
+        if index >= CHOICE_SINES {
+            return 2;
+        }
+        let compared = if index < COMPARISON_SINES {
+            KINDS.len()
+        } else {
+            1
+        };
+        // The PID and the N-PID alone, the best law once more, and the PID again.
+        3 + compared + REPEATS * usize::from(index == 0)
+    };
+    let usual = sines(info).into_iter().enumerate();
+    let usual_s = usual.map(|(index, sine)| runs(index) as f64 * one_lasts_s(&sine, SCORED_CYCLES));
+    // The PID alone and the chosen law.
+    let small = small_sines(info).into_iter();
+    let small_s = small.map(|small| 2.0 * one_lasts_s(&small.sine, small.scored_cycles));
+    usual_s.chain(small_s).sum()
+}

@@ -1,0 +1,236 @@
+//! Small slow motions: the chosen law must not be worse than the PID there either.
+//!
+//! The level of friction that is fed forward at the slow speed of the reference is more than a table needs once it breaks away. What is
+//! left over, divided by the stiffness of a soft loop, throws the axis. Less friction takes the throw away; the same level at every
+//! speed, below what sliding keeps, loses least on other motions. An axis that noise shakes meets less friction the slower it is.
+
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_settings::AxisSettings;
+use quadrant_sim::sine_test::SineTest;
+
+use super::VerifyError;
+use super::law_result::LawResult;
+use super::sines::{CHOICE_SINES, SmallSine};
+use super::trials::Trials;
+use super::variants::{flattened, lessened_when_slow, with_friction};
+
+/// Largest excess of a largest error over the PID's that counts as none, counts: one, by which that of an axis that sticks scatters, and
+/// what rounding adds.
+const MAX_EXCESS_COUNTS: f64 = 1.1;
+
+/// A law that was not chosen because it was worse than the PID on a small slow sine.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refused {
+    /// Its name.
+    pub law: String,
+    /// The sine on which it was worst; none where it was stopped.
+    pub worst: Option<WorseSine>,
+}
+
+/// Errors on a sine on which a law is worse than the PID.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorseSine {
+    /// The sine.
+    pub sine: SineTest,
+    /// Largest error of the law, mm.
+    pub largest_mm: f64,
+    /// Largest error of the PID, mm.
+    pub pid_mm: f64,
+}
+
+/// Change of a feedforward that is worse than none on small slow motions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Remedy {
+    /// A level that no speed changes: this share of the lower one of the Coulomb and the breakaway level.
+    Flat(f64),
+    /// The lower level, of which only a share is left at the lowest speeds: an axis that noise shakes meets little friction when slow.
+    LessWhenSlow {
+        share: f64,
+        /// Speed at which it has come back by 63 % of what is missing, mm/s.
+        speed_mm_s: f64,
+    },
+    /// This share of all friction.
+    Share(f64),
+}
+
+/// What is tried: the first that is not worse than the PID on any sine is chosen. On random axes a flat level of 0.9 lost least where the
+/// table was thrown, and less at low speeds where the axis met little friction.
+pub(super) const REMEDIES: [Remedy; 7] = [
+    Remedy::Flat(0.9),
+    Remedy::LessWhenSlow {
+        share: 0.5,
+        speed_mm_s: 0.3,
+    },
+    Remedy::Share(0.75),
+    Remedy::Flat(0.7),
+    Remedy::LessWhenSlow {
+        share: 0.5,
+        speed_mm_s: 1.0,
+    },
+    Remedy::Share(0.5),
+    Remedy::Share(0.25),
+];
+
+impl Remedy {
+    /// The changed law, its name and settings; none for a model whose level no speed changes.
+    fn of(self, law: &LawResult) -> Option<(String, AxisSettings)> {
+        let (change, settings) = match self {
+            Self::Flat(share) => (
+                format!(", level x {share:.2} at any speed"),
+                flattened(&law.settings, share),
+            ),
+            Self::LessWhenSlow { .. } if law.kind() == FeedforwardKind::Dahl => return None,
+            Self::LessWhenSlow { share, speed_mm_s } => (
+                format!(", level x {share:.2} below {speed_mm_s} mm/s"),
+                lessened_when_slow(&law.settings, share, speed_mm_s),
+            ),
+            Self::Share(share) => (
+                format!(" x {share:.2}"),
+                with_friction(&law.settings, share),
+            ),
+        };
+        Some((format!("{}{change}", law.law), settings))
+    }
+}
+
+impl Trials<'_, '_> {
+    /// The chosen law's index where it is not worse than the PID on small slow sines, else that of one with less friction, or the PID's.
+    /// Laws that ran on the usual sines are added.
+    pub(super) fn keep_small(&mut self, chosen: usize) -> Result<usize, VerifyError> {
+        if chosen == 0 {
+            return Ok(0);
+        }
+        self.bench.run_small(&mut self.laws[0])?;
+        // One that is stopped is refused.
+        let _ = self.bench.run_small(&mut self.laws[chosen]);
+        let law = self.laws[chosen].clone();
+        if !self.refuses_when_small(&law) {
+            return Ok(chosen);
+        }
+        // Less of nothing is nothing.
+        let remedies = REMEDIES.iter().filter(|_| law.feeds_forward());
+        for remedy in remedies {
+            let found = self.try_remedy(*remedy, &law)?;
+            if found != 0 {
+                return Ok(found);
+            }
+        }
+        Ok(0)
+    }
+
+    /// Runs a law with less friction; its index if it is chosen, else the PID's.
+    fn try_remedy(&mut self, remedy: Remedy, law: &LawResult) -> Result<usize, VerifyError> {
+        let Some((name, settings)) = remedy.of(law) else {
+            return Ok(0);
+        };
+        let Ok((mut found, _)) = self.bench.try_law(&name, &settings, 0) else {
+            return Ok(0);
+        };
+        found.is_share = true;
+        if self.bench.run_small(&mut found).is_err() || self.refuses_when_small(&found) {
+            return Ok(0);
+        }
+        self.bench.run_on(&mut found, CHOICE_SINES);
+        self.add_and_judge(found)
+    }
+
+    /// True if a law that ran on the small sines is worse than the PID there; it is added to those that were refused.
+    fn refuses_when_small(&mut self, law: &LawResult) -> bool {
+        let worst = worst_when_small(law, &self.laws[0], self.bench.small_sines);
+        let is_refused = worst.is_some() || law.stopped.is_some();
+        if is_refused {
+            self.refused.push(Refused {
+                law: law.law.clone(),
+                worst,
+            });
+        }
+        is_refused
+    }
+}
+
+/// The small sine on which a law is worse than the PID by most, if there is one.
+fn worst_when_small(law: &LawResult, pid: &LawResult, sines: &[SmallSine]) -> Option<WorseSine> {
+    let least_mm = MAX_EXCESS_COUNTS * law.settings.encoder.resolution_mm;
+    let runs = sines.iter().zip(law.small.iter().zip(&pid.small));
+    let worse = runs.map(|(small, (own, pid))| WorseSine {
+        sine: small.sine,
+        largest_mm: own.largest_mm,
+        pid_mm: pid.largest_mm,
+    });
+    let ratio = |worse: &WorseSine| worse.largest_mm / worse.pid_mm;
+    worse
+        .filter(|worse| worse.largest_mm - worse.pid_mm > least_mm)
+        .max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use quadrant_settings::StageSettings;
+    use quadrant_sim::metrics::Score;
+
+    use super::super::sines::SMALL_SINES;
+    use super::*;
+    use crate::record::Recording;
+
+    /// A law with a largest error on each of the first small sines, in counts.
+    fn law(largest_counts: &[f64]) -> LawResult {
+        let settings = StageSettings::simulated().axes[0].clone();
+        let count_mm = settings.encoder.resolution_mm;
+        LawResult {
+            law: "a law".to_owned(),
+            scores: Vec::new(),
+            small: largest_counts
+                .iter()
+                .map(|counts| Score {
+                    largest_mm: counts * count_mm,
+                    rms_mm: counts * count_mm,
+                    glitch_mm: 0.0,
+                })
+                .collect(),
+            recording: Recording::default(),
+            stopped: None,
+            rings: Vec::new(),
+            is_share: false,
+            at_s: Vec::new(),
+            settings,
+        }
+    }
+
+    #[test]
+    fn a_law_is_worse_where_its_largest_error_exceeds_the_pids_by_more_than_a_count() {
+        let pid = law(&[40.0, 60.0]);
+        let worst = |counts: [f64; 2]| {
+            worst_when_small(&law(&counts), &pid, &SMALL_SINES).map(|worst| worst.sine)
+        };
+        assert_eq!(worst([41.0, 61.0]), None);
+        assert_eq!(worst([41.2, 10.0]), Some(SMALL_SINES[0].sine));
+        // By ratio, not by the difference.
+        assert_eq!(worst([60.0, 85.0]), Some(SMALL_SINES[0].sine));
+        assert_eq!(worst([60.0, 95.0]), Some(SMALL_SINES[1].sine));
+    }
+
+    #[test]
+    fn each_remedy_feeds_less_friction_forward_when_slow_and_never_more() {
+        let law = law(&[]);
+        let fed_v = |settings: &AxisSettings, speed_mm_s: f64| {
+            let level_v = settings.friction.sliding.positive.curve.level_v(speed_mm_s);
+            settings.feedforward.gains.presliding * level_v
+        };
+        for remedy in REMEDIES {
+            let (name, settings) = remedy.of(&law).unwrap();
+            for speed_mm_s in [0.0, 0.2, 1.0, 5.0, 50.0] {
+                let share = fed_v(&settings, speed_mm_s) / fed_v(&law.settings, speed_mm_s);
+                let most = if speed_mm_s < 1.0 { 0.91 } else { 1.0 };
+                assert!(share <= most, "{name}: {share} at {speed_mm_s} mm/s");
+            }
+        }
+    }
+
+    #[test]
+    fn dahls_model_whose_level_no_speed_changes_is_not_tried_with_less_when_slow() {
+        let mut law = law(&[]);
+        law.settings.feedforward.kind = FeedforwardKind::Dahl;
+        let tried = REMEDIES.iter().filter(|remedy| remedy.of(&law).is_some());
+        assert_eq!(tried.count(), REMEDIES.len() - 2);
+    }
+}
