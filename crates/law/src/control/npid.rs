@@ -32,13 +32,6 @@ impl NonlinearGain {
     pub fn largest(&self) -> f64 {
         self.at(self.range_mm)
     }
-
-    /// The largest slope of k(e) e, `cosh x + x sinh x` with x = ko emax: the gain that small motions about a lasting
-    /// error just below emax see. Where it exceeds the loop's gain margin, the loop hunts about such an error.
-    pub fn largest_slope(&self) -> f64 {
-        let x = self.rate_per_mm * self.range_mm;
-        libm::cosh(x) + x * libm::sinh(x)
-    }
 }
 
 /// The nonlinear gain ready for the tick.

@@ -71,7 +71,7 @@ pub enum VerifyError {
     TestAxis(#[from] ExperimentError),
     /// The PID alone oscillates.
     #[error(
-        "The PID oscillates at {:.0} Hz ({:.1} um), in every motion of the axis",
+        "the PID oscillates at {:.0} Hz ({:.1} um), in every motion of the axis",
         .0.frequency_hz,
         1e3 * .0.amplitude_mm
     )]
@@ -91,9 +91,11 @@ impl VerifyError {
 
 /// Tries laws on the axis: the PID alone, the N-PID alone, the N-PID with every kind of feedforward that was identified, the best of
 /// them over other ranges of pre-sliding displacement, less of it where it is worse than the PID anywhere, and as much of the best as its
-/// errors ask for. Chooses the best of those that are not worse, on sines either that were withheld until then. Where there is none, other
-/// kinds and shares take their turn, and then what was tried, without the nonlinear gain. One that is worse on small slow sines is replaced by
-/// less of it, or by the PID alone.
+/// errors ask for.
+///
+/// Chooses the best law that is not worse than the PID, also on sines that were withheld until then. Where there is none, other kinds and
+/// shares take their turn, and then what was tried, without the nonlinear gain. A choice that is worse on small slow sines is replaced by less
+/// of it, or by the PID alone.
 ///
 /// # Errors
 /// A PID whose settings are refused, that is stopped, or that oscillates.
