@@ -10,12 +10,13 @@ use core::mem::MaybeUninit;
 
 use quadrant_law::axis::{Axis, AxisBuilder, AxisError, AxisState, OutputStage};
 use quadrant_law::control::pid::PidGains;
-use quadrant_law::encoder::EncoderReading;
+use quadrant_law::encoder::{Encoder, EncoderReading};
 use quadrant_law::feedforward::{FeedforwardGains, FeedforwardKind};
 use quadrant_law::friction::gms::{GmsElement, GmsElements, GmsParameters};
 use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant_law::friction::{FrictionSettings, PerDirection};
 use quadrant_law::reference::ReferenceSample;
+use quadrant_law::safety::FaultCode;
 use quadrant_law::safety::monitor::Following;
 use quadrant_law::units::Position;
 
@@ -51,7 +52,7 @@ pub struct QuadrantFriction {
     pub breakaway_v: f64,
     /// Velocity at which the level has gone most of the way from one to the other, mm/s; above zero.
     pub stribeck_velocity_mm_s: f64,
-    /// Exponent of that velocity, 1 or 2.
+    /// Exponent of that velocity, above 0 and at most 4; mostly 1 or 2.
     pub exponent: f64,
     /// Friction that grows with the velocity, V s/mm.
     pub viscous_v_s_per_mm: f64,
@@ -73,17 +74,19 @@ pub struct QuadrantElement {
 pub struct QuadrantParameters {
     /// Length of an encoder count, mm.
     pub resolution_mm: f64,
+    /// Width of the encoder's counter, 8 to 32 bits, or 0 for 32: it may wrap. Bits above it may hold anything.
+    pub counter_bits: u32,
     /// Control periods per second, 1/s.
     pub rate_hz: f64,
-    /// Largest output, V; at most `full_scale_v`.
+    /// Largest output before the offset, V; at most `full_scale_v`.
     pub limit_v: f64,
     /// Voltage of the converter's largest code, V.
     pub full_scale_v: f64,
-    /// Voltage at which the motor gives no force, V; it is added to every output.
+    /// Voltage at which the motor gives no force, V, at most a tenth of `full_scale_v`; it is added to every output.
     pub offset_v: f64,
     /// True if a positive voltage moves the axis to smaller counts.
     pub reversed: bool,
-    /// Proportional gain, V/mm.
+    /// Proportional gain, V/mm; above zero.
     pub kp_v_per_mm: f64,
     /// Integral gain, V/(mm s).
     pub ki_v_per_mm_s: f64,
@@ -109,19 +112,19 @@ pub struct QuadrantParameters {
     pub inertia_v_s2_per_mm: f64,
     /// Ticks that feedforward looks ahead: the delay from the output to the encoder; at most 30.
     pub preview_ticks: u32,
-    /// Speed above which the axis is at fault, mm/s.
+    /// Speed above which the axis is at fault, mm/s; above zero.
     pub overspeed_mm_s: f64,
-    /// Error at rest above which the axis is at fault, mm.
+    /// Error at rest above which the axis is at fault, mm; above zero.
     pub following_error_mm: f64,
     /// Growth of that error with the speed of the reference, s.
     pub following_lag_s: f64,
 }
 
-/// A point of the reference, after the preview.
+/// A point of the reference: where it is to be `preview_ticks` from now. The axis delays it for its feedback by itself.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct QuadrantReference {
-    /// Position, 1/65536 of a count.
+    /// Position, 1/65536 of a count, from where the encoder was first read.
     pub position: i64,
     /// Velocity, mm/s.
     pub velocity_mm_s: f32,
@@ -139,7 +142,7 @@ pub enum QuadrantError {
     Resolution = 1,
     /// `rate_hz` is not above zero.
     Rate = 2,
-    /// `limit_v` is not above zero and within `full_scale_v`.
+    /// `limit_v` is not above zero and within `full_scale_v`, or `offset_v` is more than a tenth of that.
     OutputLimit = 3,
     /// `preview_ticks` is too large.
     Preview = 4,
@@ -147,8 +150,15 @@ pub enum QuadrantError {
     Elements = 5,
     /// A number is infinite or none.
     NotFinite = 6,
-    /// A gain of the PID, or `integral_limit_v`, is negative.
+    /// A gain of the PID, or `integral_limit_v`, is negative, or `kp_v_per_mm` is zero.
     Gains = 7,
+    /// Friction that cannot be: a negative level, share, stiffness or inertia, a velocity or an exponent out of its range, or weights that do
+    /// not add up to 1.
+    Friction = 8,
+    /// `overspeed_mm_s` or `following_error_mm` is not above zero, or `following_lag_s` is negative.
+    Monitor = 9,
+    /// `counter_bits` is not 0 and not 8 to 32.
+    CounterBits = 10,
 }
 
 impl From<AxisError> for QuadrantError {
@@ -173,6 +183,15 @@ impl QuadrantFriction {
             self.exponent,
             self.viscous_v_s_per_mm,
         ]
+    }
+
+    fn is_valid(&self) -> bool {
+        self.coulomb_v >= 0.0
+            && self.breakaway_v >= 0.0
+            && self.stribeck_velocity_mm_s > 0.0
+            && self.exponent > 0.0
+            && self.exponent <= 4.0
+            && self.viscous_v_s_per_mm >= 0.0
     }
 
     fn sliding(&self) -> StaticFriction {
@@ -208,7 +227,7 @@ impl QuadrantParameters {
             self.following_error_mm,
             self.following_lag_s,
         ];
-        let elements = self.elements.iter();
+        let elements = self.elements.iter().take(self.element_count as usize);
         own.into_iter()
             .chain(self.positive.numbers())
             .chain(self.negative.numbers())
@@ -216,14 +235,50 @@ impl QuadrantParameters {
             .all(f64::is_finite)
     }
 
+    /// True for friction that can be; any where none is fed forward.
+    fn is_friction(&self, elements: &[QuadrantElement]) -> bool {
+        let sum: f64 = elements.iter().map(|element| element.weight).sum();
+        let has_elements = (sum - 1.0).abs() < 1e-3
+            && elements
+                .iter()
+                .all(|element| element.weight >= 0.0 && element.stiffness_v_per_mm > 0.0);
+        self.inertia_v_s2_per_mm >= 0.0
+            && (elements.is_empty()
+                || has_elements
+                    && self.positive.is_valid()
+                    && self.negative.is_valid()
+                    && self.attraction_v_s >= 0.0
+                    && self.friction_share >= 0.0)
+    }
+
+    /// The first part that cannot be, of those that the builder does not look at.
+    fn check(&self, elements: &[QuadrantElement]) -> Result<(), QuadrantError> {
+        let is_monitor = self.overspeed_mm_s > 0.0
+            && self.following_error_mm > 0.0
+            && self.following_lag_s >= 0.0;
+        let checks = [
+            (self.is_finite(), QuadrantError::NotFinite),
+            (
+                matches!(self.counter_bits, 0 | 8..=32),
+                QuadrantError::CounterBits,
+            ),
+            (
+                self.offset_v.abs() <= 0.1 * self.full_scale_v,
+                QuadrantError::OutputLimit,
+            ),
+            (self.is_friction(elements), QuadrantError::Friction),
+            (is_monitor, QuadrantError::Monitor),
+        ];
+        let found = checks.into_iter().find(|(holds, _)| !holds);
+        found.map_or(Ok(()), |(_, error)| Err(error))
+    }
+
     fn build(&self, axis: &mut Axis<f32, QUADRANT_ELEMENTS>) -> Result<(), QuadrantError> {
-        if !self.is_finite() {
-            return Err(QuadrantError::NotFinite);
-        }
         let elements = self
             .elements
             .get(..self.element_count as usize)
             .ok_or(QuadrantError::Elements)?;
+        self.check(elements)?;
         let elements: GmsElements = elements
             .iter()
             .map(|element| GmsElement {
@@ -261,7 +316,13 @@ impl QuadrantParameters {
         };
         let (error_mm, lag_s) = (self.following_error_mm, self.following_lag_s);
         let period_s = 1.0 / self.rate_hz;
+        let bits = if self.counter_bits == 0 {
+            32
+        } else {
+            self.counter_bits
+        };
         AxisBuilder::new(axis, self.resolution_mm, period_s)
+            .encoder(Encoder::new(bits, false, i32::MAX))
             .output(OutputStage {
                 limit_v: self.limit_v,
                 full_scale_v: self.full_scale_v,
@@ -321,7 +382,8 @@ pub unsafe extern "C" fn quadrant_axis_build(
     }
 }
 
-/// Prepares the axis to hold where its encoder stands: before the outputs are switched on, and in every period that they are off.
+/// Prepares the axis to hold where its encoder stands, and forgets what went before: in every period that the outputs are off, after
+/// `quadrant_axis_tick`. When they are switched on the reference begins at `quadrant_axis_position`.
 ///
 /// # Safety
 /// `axis` was made by `quadrant_axis_build`, and nothing else uses it meanwhile.
@@ -344,7 +406,11 @@ pub unsafe extern "C" fn quadrant_axis_position(axis: *mut QuadrantAxis) -> i64 
 }
 
 /// One control period: the counter of the encoder and the reference in, the converter's word out, -32768 to 32767. Returns the number
-/// of the fault (`docs/safety.md`), 0 for none; with a fault the word is 0, and the caller switches the amplifier off.
+/// of the fault (`docs/safety.md`), 0 for none. With a fault the word is 0, and the caller switches the amplifier off and keeps the fault: the
+/// axis does not, and may put out again in the next period. A reference that is no finite number is fault 1, following error.
+///
+/// Also call it in every period that the outputs are off, so that the encoder is followed: with a reference that stands at
+/// `quadrant_axis_position`, and `quadrant_axis_hold_here` after it. What it returns then does not matter.
 ///
 /// # Safety
 /// `axis` was made by `quadrant_axis_build`, nothing else uses it meanwhile, and `reference` and `word` point to one of these each.
@@ -357,6 +423,11 @@ pub unsafe extern "C" fn quadrant_axis_tick(
 ) -> u8 {
     // SAFETY: the caller's promise.
     let (parts, reference) = unsafe { (parts(axis), &*reference) };
+    if !reference.velocity_mm_s.is_finite() || !reference.acceleration_mm_s2.is_finite() {
+        // SAFETY: the caller's promise.
+        unsafe { word.write(0) };
+        return FaultCode::FollowingError as u8;
+    }
     let ahead = ReferenceSample {
         position: Position(reference.position),
         velocity: reference.velocity_mm_s,

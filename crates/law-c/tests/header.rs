@@ -14,7 +14,8 @@ use quadrant_law::reference::{MotionScale, ReferenceSample};
 use quadrant_law::safety::monitor::Following;
 use quadrant_law::units::Position;
 use quadrant_law_c::{
-    QuadrantAxis, QuadrantError, QuadrantParameters, quadrant_axis_build, quadrant_axis_tick,
+    QuadrantAxis, QuadrantElement, QuadrantError, QuadrantFriction, QuadrantParameters,
+    QuadrantReference, quadrant_axis_build, quadrant_axis_position, quadrant_axis_tick,
 };
 
 fn package() -> &'static Path {
@@ -188,9 +189,9 @@ fn the_example_in_c_shows_what_feedforward_gains() {
     );
 }
 
-/// What `quadrant_axis_build` says of parameters, and the first word of the axis 100 counts away from its reference.
-fn made(change: impl FnOnce(&mut QuadrantParameters)) -> (QuadrantError, u8, i16) {
-    let mut parameters = QuadrantParameters {
+/// An axis without feedforward.
+fn usual() -> QuadrantParameters {
+    QuadrantParameters {
         resolution_mm: 0.5e-3,
         rate_hz: 1e4,
         limit_v: 10.0,
@@ -200,11 +201,16 @@ fn made(change: impl FnOnce(&mut QuadrantParameters)) -> (QuadrantError, u8, i16
         overspeed_mm_s: 100.0,
         following_error_mm: 1.0,
         ..QuadrantParameters::default()
-    };
+    }
+}
+
+/// What `quadrant_axis_build` says of parameters, and the first word of the axis 100 counts away from its reference.
+fn made(change: impl FnOnce(&mut QuadrantParameters)) -> (QuadrantError, u8, i16) {
+    let mut parameters = usual();
     change(&mut parameters);
     let mut axis = Box::<QuadrantAxis>::new_uninit();
     let mut word = 1;
-    let reference = quadrant_law_c::QuadrantReference {
+    let reference = QuadrantReference {
         position: 100 << 16,
         ..Default::default()
     };
@@ -216,11 +222,35 @@ fn made(change: impl FnOnce(&mut QuadrantParameters)) -> (QuadrantError, u8, i16
     }
 }
 
+/// Friction that can be, of one element.
+fn feeds(parameters: &mut QuadrantParameters) -> &mut QuadrantParameters {
+    let friction = QuadrantFriction {
+        coulomb_v: 0.1,
+        breakaway_v: 0.15,
+        stribeck_velocity_mm_s: 1.0,
+        exponent: 1.0,
+        viscous_v_s_per_mm: 1e-3,
+    };
+    (parameters.positive, parameters.negative) = (friction, friction);
+    parameters.elements[0] = QuadrantElement {
+        stiffness_v_per_mm: 10.0,
+        weight: 1.0,
+    };
+    (parameters.element_count, parameters.friction_share) = (1, 1.0);
+    parameters
+}
+
 #[test]
 fn a_refused_axis_says_why_and_puts_out_nothing() {
     assert_eq!(made(|_| ()), (QuadrantError::None, 0, 164));
+    assert_eq!(made(|of| _ = feeds(of)).0, QuadrantError::None);
+    // What is in elements beyond their number does not matter.
+    assert_eq!(
+        made(|of| of.elements[7].weight = f64::NAN).0,
+        QuadrantError::None
+    );
     type Change = fn(&mut QuadrantParameters);
-    let refused: [(Change, QuadrantError); 8] = [
+    let refused: [(Change, QuadrantError); 17] = [
         (|of| of.resolution_mm = 0.0, QuadrantError::Resolution),
         (|of| of.rate_hz = -1.0, QuadrantError::Rate),
         (|of| of.limit_v = 11.0, QuadrantError::OutputLimit),
@@ -228,8 +258,29 @@ fn a_refused_axis_says_why_and_puts_out_nothing() {
         (|of| of.element_count = 9, QuadrantError::Elements),
         (|of| of.kp_v_per_mm = f64::NAN, QuadrantError::NotFinite),
         (|of| of.ki_v_per_mm_s = -1.0, QuadrantError::Gains),
+        (|of| of.offset_v = 1.1, QuadrantError::OutputLimit),
+        (|of| of.inertia_v_s2_per_mm = -1.0, QuadrantError::Friction),
         (
-            |of| of.elements[7].weight = f64::INFINITY,
+            |of| feeds(of).elements[0].weight = 1.1,
+            QuadrantError::Friction,
+        ),
+        (
+            |of| feeds(of).positive.coulomb_v = -0.1,
+            QuadrantError::Friction,
+        ),
+        (
+            |of| feeds(of).negative.exponent = 0.0,
+            QuadrantError::Friction,
+        ),
+        (
+            |of| feeds(of).attraction_v_s = -5.0,
+            QuadrantError::Friction,
+        ),
+        (|of| of.overspeed_mm_s = 0.0, QuadrantError::Monitor),
+        (|of| of.following_lag_s = -0.1, QuadrantError::Monitor),
+        (|of| of.counter_bits = 33, QuadrantError::CounterBits),
+        (
+            |of| feeds(of).elements[0].weight = f64::INFINITY,
             QuadrantError::NotFinite,
         ),
     ];
@@ -243,4 +294,57 @@ fn a_refused_axis_says_why_and_puts_out_nothing() {
 fn an_axis_that_does_not_follow_is_at_fault_and_puts_out_nothing() {
     let (error, fault, word) = made(|of| of.following_error_mm = 0.01);
     assert_eq!((error, fault, word), (QuadrantError::None, 1, 0));
+}
+
+#[test]
+fn a_reference_that_is_no_number_is_a_fault() {
+    for (velocity_mm_s, acceleration_mm_s2) in
+        [(f32::NAN, 0.0), (f32::INFINITY, 0.0), (0.0, f32::NAN)]
+    {
+        let ticked = ticks(|_| (), &[(0, velocity_mm_s, acceleration_mm_s2)]);
+        assert_eq!(ticked, [(1, 0, 0)]);
+    }
+}
+
+#[test]
+fn a_counter_of_16_bits_may_wrap() {
+    let counts = [0xFFF0, 0xFFFF, 0x0005, 0x000F].map(|count| (count, 0.0, 0.0));
+    let positions = ticks(
+        |of| (of.counter_bits, of.following_error_mm) = (16, 10.0),
+        &counts,
+    );
+    let positions = positions.map(|(fault, _, position)| (fault, position >> 16));
+    assert_eq!(positions, [(0, 0), (0, 15), (0, 21), (0, 31)]);
+}
+
+/// Fault, word and position of an axis whose reference stands, tick by tick, at these counts, velocities and accelerations.
+fn ticks<const N: usize>(
+    change: impl FnOnce(&mut QuadrantParameters),
+    inputs: &[(u32, f32, f32); N],
+) -> [(u8, i16, i64); N] {
+    let mut parameters = usual();
+    change(&mut parameters);
+    let mut axis = Box::<QuadrantAxis>::new_uninit();
+    // SAFETY: memory of these types, used by nothing else; the axis is made before it is ticked.
+    let error = unsafe { quadrant_axis_build(axis.as_mut_ptr(), &raw const parameters) };
+    assert_eq!(error, QuadrantError::None);
+    inputs.map(|(count, velocity_mm_s, acceleration_mm_s2)| {
+        let reference = QuadrantReference {
+            position: 0,
+            velocity_mm_s,
+            acceleration_mm_s2,
+        };
+        let mut word = 1;
+        // SAFETY: as above.
+        let (fault, position) = unsafe {
+            let fault = quadrant_axis_tick(
+                axis.as_mut_ptr(),
+                &raw const reference,
+                count,
+                &raw mut word,
+            );
+            (fault, quadrant_axis_position(axis.as_mut_ptr()))
+        };
+        (fault, word, position)
+    })
 }

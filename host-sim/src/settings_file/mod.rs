@@ -250,6 +250,12 @@ mod tests {
                 .gains
                 .presliding
         );
+        let both = "[[stage.axes]]\nfeedforward.gains = { gms = 0.75, presliding = 0.5 }\n";
+        let error = parse(both).unwrap_err();
+        assert!(
+            error.to_string().contains("x/feedforward/gains/gms"),
+            "{error}"
+        );
         let error = parse("[[stage.axes]]\nfeedforward.gms = 0.75\n").unwrap_err();
         assert!(error.to_string().contains("x/feedforward/gms"), "{error}");
     }

@@ -121,10 +121,12 @@ fn rename(stage: &mut Table) {
                 continue;
             };
             let part: Vec<&str> = part.split('/').collect();
+            // Beside its present name a former one is unknown.
             if let Some(table) = below(axis, &part)
+                && !table.contains_key(present)
                 && let Some(value) = table.remove(former)
             {
-                table.entry(present).or_insert(value);
+                table.insert(present.to_owned(), value);
             }
         }
     }

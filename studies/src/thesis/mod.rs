@@ -1,6 +1,6 @@
 //! The thesis' chapters 3 to 5 and its headline figures on the simulated stage.
 //!
-//! A part of the report is a function from [`Context`] to sections, and an entry in [`PARTS`].
+//! A part of the report is a function from [`Context`] to sections, and an entry in `PARTS`.
 
 pub mod chapter3;
 pub mod chapter4;

@@ -44,7 +44,7 @@ pub enum AxisError {
     Period(f64),
     /// The output limit, V: not above zero, beyond the amplifier's full scale, or not given.
     OutputLimit(f64),
-    /// A gain of the PID or the limit of its integral: negative, or no finite number.
+    /// A gain of the PID or the limit of its integral: negative, no finite number, or no proportional gain at all.
     Gains,
     /// The preview in ticks: more than [`MAX_PREVIEW_TICKS`].
     Preview(usize),
@@ -62,9 +62,9 @@ impl fmt::Display for AxisError {
                 "an output limit of {} V is not above zero and within the amplifier's full scale",
                 Decimal(*v)
             ),
-            Self::Gains => {
-                f.write_str("a gain or the integral's limit is negative or no finite number")
-            }
+            Self::Gains => f.write_str(
+                "a gain or the integral's limit is negative or no finite number, or kp is zero",
+            ),
             Self::Preview(ticks) => write!(
                 f,
                 "a preview of {ticks} ticks is longer than {MAX_PREVIEW_TICKS}"
@@ -348,7 +348,7 @@ impl<S: Scalar, const N: usize> AxisBuilder<'_, S, N> {
     #[must_use]
     pub fn pid(self, gains: &PidGains, integral_limit_v: f64) -> Self {
         let pid = Pid::build(gains, integral_limit_v, self.period_s);
-        let is_limit = integral_limit_v >= 0.0 && integral_limit_v < f64::INFINITY;
+        let is_limit = (0.0..f64::INFINITY).contains(&integral_limit_v);
         self.feedback(Feedback::Pid(pid))
             .require(gains.is_valid() && is_limit, AxisError::Gains)
     }

@@ -214,7 +214,7 @@ fn channels_have_their_golden_numbers() {
             "d[V]",
             "level[V]",
             "viscous[V]",
-            "gms[V]",
+            "presliding[V]",
             "inertia[V]",
             "transfer[V]",
             "output[V]",

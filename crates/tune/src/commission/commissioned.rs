@@ -179,12 +179,16 @@ fn verdict(trials: &Verification) -> Vec<String> {
     });
     let choice = if trials.is_better_than_pid() {
         format!(
-            "Chosen: {}, with {:.0} % of the PID's errors on the mean over {} sines, and {:.0} % at worst; on small slow motions it is no \
-             worse.",
+            "Chosen: {}, with {:.0} % of the PID's errors on the mean over {} sines, and {:.0} % at worst; on small slow motions it is {}.",
             chosen.law,
             100.0 * mean,
             trials.sines.len(),
-            100.0 * worst
+            100.0 * worst,
+            if trials.is_worse_when_small() {
+                "worse, and so is less of it: for work of that kind set feedforward.kind to none"
+            } else {
+                "no worse"
+            }
         )
     } else {
         "Nothing was better than the PID alone on every sine: the settings are those of the PID."

@@ -1,5 +1,6 @@
 //! Trials of the commissioned laws on the axis itself, by its own encoder, and the choice among them: no law is selected
-//! that is worse than the PID alone on any of the sines, on those that no law was chosen by, or on small slow ones.
+//! that is worse than the PID alone on any of the sines or on those that no law was chosen by; on small slow ones, if
+//! any is not.
 
 mod bench;
 mod law_result;
@@ -29,7 +30,8 @@ pub struct Verification {
     pub laws: Vec<LawResult>,
     /// Index of the chosen law.
     pub chosen: usize,
-    /// The laws that were worse than the PID on a small slow sine, in the order in which they ran.
+    /// The laws that were worse than the PID on a small slow sine, in the order in which they ran: the chosen one among them, if less
+    /// of it was worse, too.
     pub refused: Vec<Refused>,
     /// Change of the axis meanwhile, on the first sine.
     pub drift: Drift,
@@ -39,6 +41,14 @@ impl Verification {
     /// True if a law was found that is better than the PID alone by enough, and nowhere worse.
     pub fn is_better_than_pid(&self) -> bool {
         self.chosen != 0
+    }
+
+    /// True if the chosen law is worse than the PID on a small slow sine: so was less of it.
+    pub fn is_worse_when_small(&self) -> bool {
+        let chosen = self.is_better_than_pid().then_some(&self.chosen().law);
+        self.refused
+            .iter()
+            .any(|refused| Some(&refused.law) == chosen)
     }
 
     pub fn chosen(&self) -> &LawResult {
@@ -95,7 +105,7 @@ impl VerifyError {
 ///
 /// Chooses the best law that is not worse than the PID, also on sines that were withheld until then. Where there is none, other kinds and
 /// shares take their turn, and then what was tried, without the nonlinear gain. A choice that is worse on small slow sines is replaced by less
-/// of it, or by the PID alone.
+/// of it that is not.
 ///
 /// # Errors
 /// A PID whose settings are refused, that is stopped, or that oscillates.

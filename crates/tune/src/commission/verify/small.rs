@@ -18,7 +18,7 @@ use super::variants::{flattened, lessened_when_slow, with_friction};
 /// what rounding adds.
 const MAX_EXCESS_COUNTS: f64 = 1.1;
 
-/// A law that was not chosen because it was worse than the PID on a small slow sine.
+/// A law that was worse than the PID on a small slow sine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Refused {
     /// Its name.
@@ -94,8 +94,8 @@ impl Remedy {
 }
 
 impl Trials<'_, '_> {
-    /// The chosen law's index where it is not worse than the PID on small slow sines, else that of one with less friction, or the PID's.
-    /// Laws that ran on the usual sines are added.
+    /// The chosen law's index where it is not worse than the PID on small slow sines, else that of one with less friction. Where all of
+    /// those are worse, too, the chosen one stays, among those that were refused. Laws that ran on the usual sines are added.
     pub(super) fn keep_small(&mut self, chosen: usize) -> Result<usize, VerifyError> {
         if chosen == 0 {
             return Ok(0);
@@ -115,7 +115,7 @@ impl Trials<'_, '_> {
                 return Ok(found);
             }
         }
-        Ok(0)
+        Ok(chosen)
     }
 
     /// Runs a law with less friction; its index if it is chosen, else the PID's.
