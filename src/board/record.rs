@@ -20,7 +20,7 @@ impl<const N: usize> Record<N> {
         self.0.get().cast::<u8>().wrapping_add(index)
     }
 
-    /// What the firmware before this one left, or anything.
+    /// The bytes that the firmware before this one left, or any.
     pub(super) fn read(&self) -> [u8; N] {
         // SAFETY: inside the record; every content of the memory is a byte, and volatile, as no Rust code has written it.
         core::array::from_fn(|index| unsafe { self.byte(index).read_volatile() })

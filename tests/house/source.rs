@@ -1,4 +1,4 @@
-//! What the checks read of Rust source, line by line: it is formatted, so an enum's variants are indented by one step, and a
+//! Rust source as the checks read it, line by line: it is formatted, so an enum's variants are indented by one step, and a
 //! comment begins its line or follows a space.
 
 use std::collections::BTreeSet;

@@ -25,7 +25,7 @@ const GOLDEN: Golden = Golden {
 /// Lines of a package.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 struct Lines {
-    /// What is not a test, with its comments.
+    /// Lines that are not tests, comments among them.
     code: u32,
     /// Files below a folder `tests`, and modules of that name.
     tests: u32,

@@ -16,7 +16,6 @@ use quadrant_law::friction::gms::{GmsElement, GmsElements, GmsParameters};
 use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant_law::friction::{FrictionSettings, PerDirection};
 use quadrant_law::reference::ReferenceSample;
-use quadrant_law::safety::FaultCode;
 use quadrant_law::safety::monitor::Following;
 use quadrant_law::units::Position;
 
@@ -26,7 +25,7 @@ pub const QUADRANT_ELEMENTS: usize = 8;
 /// Room for an axis in words of 8 bytes.
 pub const QUADRANT_AXIS_WORDS: usize = 1536;
 
-/// What lies in a [`QuadrantAxis`].
+/// The content of a [`QuadrantAxis`].
 struct Parts {
     axis: Axis<f32, QUADRANT_ELEMENTS>,
     state: AxisState<f32, QUADRANT_ELEMENTS>,
@@ -423,11 +422,6 @@ pub unsafe extern "C" fn quadrant_axis_tick(
 ) -> u8 {
     // SAFETY: the caller's promise.
     let (parts, reference) = unsafe { (parts(axis), &*reference) };
-    if !reference.velocity_mm_s.is_finite() || !reference.acceleration_mm_s2.is_finite() {
-        // SAFETY: the caller's promise.
-        unsafe { word.write(0) };
-        return FaultCode::FollowingError as u8;
-    }
     let ahead = ReferenceSample {
         position: Position(reference.position),
         velocity: reference.velocity_mm_s,

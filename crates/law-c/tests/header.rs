@@ -204,7 +204,7 @@ fn usual() -> QuadrantParameters {
     }
 }
 
-/// What `quadrant_axis_build` says of parameters, and the first word of the axis 100 counts away from its reference.
+/// The answer of `quadrant_axis_build` to parameters, and the first fault and word of the axis 100 counts away from its reference.
 fn made(change: impl FnOnce(&mut QuadrantParameters)) -> (QuadrantError, u8, i16) {
     let mut parameters = usual();
     change(&mut parameters);

@@ -1,4 +1,4 @@
-//! What is made of the simulated stage and of measured axes for a reader: runs that are compared, and every page.
+//! Comparisons on the simulated stage, and the pages of these and of measured axes.
 //!
 //! - [`experiment`]: configurations of law and stage that runs compare;
 //! - [`compare`], [`circle`], [`replay`]: the comparison, the circle test, recorded references and part programs, each with

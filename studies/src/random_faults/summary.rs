@@ -1,4 +1,4 @@
-//! What was broken, the faults, and the campaigns that went farthest.
+//! The rules that were broken, the faults, and the campaigns that went farthest.
 
 use std::collections::BTreeMap;
 

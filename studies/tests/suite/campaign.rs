@@ -1,4 +1,4 @@
-//! What all campaigns have: seeds, parts, files of results that go on and are merged.
+//! The form of all campaigns: seeds, parts, files of results that go on and are merged.
 
 use std::fs;
 use std::path::Path;

@@ -10,8 +10,8 @@ use quadrant::hal::SettingsFlash;
 
 /// Size of a sector, as on the reference board.
 const SECTOR_BYTES: usize = 16 * 1024;
-/// Size of both sectors. together.
-const BYTES: usize = 2 * SECTOR_BYTES;
+/// Size of both sectors together.
+pub(super) const BYTES: usize = 2 * SECTOR_BYTES;
 
 /// Two sectors of 16 KiB.
 #[derive(Clone, Debug)]

@@ -10,13 +10,10 @@ use quadrant_sim::stage_setup::StageSetup;
 
 use super::flash_file::FlashFile;
 use super::loopback::{Loopback, SimulatedPeer};
-use super::memory_flash::MemoryFlash;
+use super::memory_flash::{self, MemoryFlash};
 use super::simulated::SimulatedMachine;
 use super::simulated_io::SimulatedIo;
 use super::timing::server_period;
-
-/// Size of the flash for settings: two sectors of 16 KiB.
-const FLASH_BYTES: usize = 2 << 14;
 
 /// The firmware's application on a simulated stage, and the bytes to and from it.
 pub struct SimulatedLink {
@@ -41,7 +38,7 @@ impl SimulatedLink {
             marks,
         } = setup;
         let flash = flash
-            .map(|path| FlashFile::open(path, FLASH_BYTES))
+            .map(|path| FlashFile::open(path, memory_flash::BYTES))
             .transpose()?;
         let content = flash
             .as_ref()

@@ -180,7 +180,8 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// was last [to hold](Self::hold_here).
     ///
     /// # Errors
-    /// The fault that was found, if any. It is the caller who switches the amplifier off.
+    /// The fault that was found, if any; a reference that is no finite number is a following error. It is the caller who switches the
+    /// amplifier off.
     pub fn follow(
         &self,
         state: &mut AxisState<S, N>,
@@ -189,6 +190,11 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     ) -> Result<DacCode, FaultCode> {
         let tick = state.count_tick();
         self.read_encoder(state, reading, is_due(tick, 0))?;
+        // Infinite or no number: nothing that is made of it could be compared with a limit.
+        let is_finite = |value: S| value + -value == S::ZERO;
+        if !is_finite(ahead.velocity) || !is_finite(ahead.acceleration) {
+            return Err(FaultCode::FollowingError);
+        }
         state.move_reference(ahead);
         let found = self.check_limits(state, AxisSwitches::default());
         self.form_error(state, tick)?;

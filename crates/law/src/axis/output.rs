@@ -4,7 +4,7 @@ use crate::rounding;
 use crate::scalar::{Quantity, Scalar};
 use crate::units::DacCode;
 
-/// What an axis puts out, and what it drives.
+/// The output of an axis, and the amplifier that it drives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutputStage {
     /// Largest output, V; at most `full_scale_v`.

@@ -540,6 +540,21 @@ fn a_reference_from_elsewhere_gives_the_words_of_the_same_motion() {
 }
 
 #[test]
+fn a_reference_from_elsewhere_that_is_no_number_is_a_following_error() {
+    let settings = StageSettings::simulated();
+    let axis: Axis<f32> = settings.build_axis(AxisName::X);
+    for (velocity, acceleration) in [(f32::NAN, 0.0), (0.0, f32::NAN), (f32::NEG_INFINITY, 0.0)] {
+        let ahead = ReferenceSample {
+            velocity,
+            acceleration,
+            ..ReferenceSample::default()
+        };
+        let found = axis.follow(&mut AxisState::default(), &ahead, &EncoderReading::of(0));
+        assert_eq!(found, Err(FaultCode::FollowingError));
+    }
+}
+
+#[test]
 fn a_reference_from_elsewhere_that_jumps_is_a_following_error() {
     let settings = StageSettings::simulated();
     let axis: Axis<f32> = settings.build_axis(AxisName::X);

@@ -166,7 +166,7 @@ impl Commissioned {
     }
 }
 
-/// What the trials chose, in sentences.
+/// The choice of the trials, in sentences.
 fn verdict(trials: &Verification) -> Vec<String> {
     let chosen = trials.chosen();
     let (worst, mean) = trials.against_pid(chosen);

@@ -1,7 +1,9 @@
 //! Commissioning of axes unlike the simulated stage's: what was refused once, or ended with a law worse than the PID.
 
+use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::friction::dahl::DahlParameters;
 use quadrant_law::friction::lugre::LugreParameters;
+use quadrant_law::reference::MotionSettings;
 use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::plant::{
     AxisParameters, Backlash, Drive, EncoderSide, FrictionParameters, StageParameters,
@@ -9,7 +11,8 @@ use quadrant_sim::plant::{
 use quadrant_tune::commission::{CommissionSettings, Commissioned, Planned, commission, plan};
 use quadrant_tune::record::Recording;
 use quadrant_tune::test_axis::{
-    AxisInfo, Experiment, ExperimentError, MachineError, SimulatedTestAxis, TestAxis, Travel,
+    AxisInfo, Drive as Driven, Experiment, ExperimentError, MachineError, SimulatedTestAxis,
+    TestAxis, Travel,
 };
 use rayon::prelude::*;
 
@@ -92,6 +95,59 @@ fn a_law_is_not_refused_because_the_axis_warmed_before_it_was_tried() {
         "{:?}",
         verification.refused
     );
+}
+
+/// An axis that stops at small slow motions with feedforward.
+struct StopsWhenSmall(SimulatedTestAxis);
+
+impl TestAxis for StopsWhenSmall {
+    fn info(&self) -> AxisInfo {
+        self.0.info()
+    }
+
+    fn settings(&self) -> &AxisSettings {
+        self.0.settings()
+    }
+
+    fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
+        self.0.apply(settings)
+    }
+
+    fn perform(
+        &mut self,
+        experiment: &Experiment,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Recording, ExperimentError> {
+        let amplitude_mm = match &experiment.drive {
+            Driven::ClosedLoop(MotionSettings::Harmonic(sine)) => sine.amplitude_mm,
+            _ => f64::INFINITY,
+        };
+        let feeds_forward = self.settings().feedforward.kind != FeedforwardKind::None;
+        if amplitude_mm < 0.1 && feeds_forward {
+            return Err(ExperimentError::Overspeed {
+                experiment: experiment.name.clone(),
+                max_velocity_mm_s: 1.0,
+                time_s: 0.0,
+            });
+        }
+        self.0.perform(experiment, progress)
+    }
+}
+
+#[test]
+fn a_law_that_is_stopped_on_small_slow_motions_leaves_the_pid_alone() {
+    let base = StageSettings::simulated().axes[0].clone();
+    let mut settings = commissioned(x(), 200.0).settings;
+    settings.limits = base.limits;
+    let mut axis = StopsWhenSmall(SimulatedTestAxis::new(0, x(), 2));
+    let verification =
+        quadrant_tune::commission::verify::verify(&mut axis, &settings, &mut |_| {}).unwrap();
+    assert!(
+        !verification.is_better_than_pid(),
+        "{:?}",
+        verification.chosen().law
+    );
+    assert!(verification.refused.iter().any(|law| law.worst.is_none()));
 }
 
 #[test]

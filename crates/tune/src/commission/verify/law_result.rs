@@ -1,4 +1,4 @@
-//! What one law left on the sines, and how it is compared with the PID.
+//! The errors of one law on the sines, and their comparison with the PID's.
 
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_settings::AxisSettings;

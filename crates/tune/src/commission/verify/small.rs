@@ -1,4 +1,4 @@
-//! Small slow motions: the chosen law must not be worse than the PID there either.
+//! Small slow motions: the chosen law is not to be worse than the PID there either, if less of it is not.
 //!
 //! The level of friction that is fed forward at the slow speed of the reference is more than a table needs once it breaks away. What is
 //! left over, divided by the stiffness of a soft loop, throws the axis. Less friction takes the throw away; the same level at every
@@ -53,7 +53,7 @@ pub(super) enum Remedy {
     Share(f64),
 }
 
-/// What is tried: the first that is not worse than the PID on any sine is chosen. On random axes a flat level of 0.9 lost least where the
+/// Remedies in the order in which they are tried: the first that is not worse than the PID on any sine is chosen. On random axes a flat level of 0.9 lost least where the
 /// table was thrown, and less at low speeds where the axis met little friction.
 pub(super) const REMEDIES: [Remedy; 7] = [
     Remedy::Flat(0.9),
@@ -95,7 +95,8 @@ impl Remedy {
 
 impl Trials<'_, '_> {
     /// The chosen law's index where it is not worse than the PID on small slow sines, else that of one with less friction. Where all of
-    /// those are worse, too, the chosen one stays, among those that were refused. Laws that ran on the usual sines are added.
+    /// those are worse, too, the chosen one stays, among those that were refused; but for one that was stopped there, or that feeds
+    /// nothing forward: the PID's, then. Laws that ran on the usual sines are added.
     pub(super) fn keep_small(&mut self, chosen: usize) -> Result<usize, VerifyError> {
         if chosen == 0 {
             return Ok(0);
@@ -107,15 +108,16 @@ impl Trials<'_, '_> {
         if !self.refuses_when_small(&law) {
             return Ok(chosen);
         }
-        // Less of nothing is nothing.
-        let remedies = REMEDIES.iter().filter(|_| law.feeds_forward());
-        for remedy in remedies {
-            let found = self.try_remedy(*remedy, &law)?;
+        if !law.feeds_forward() {
+            return Ok(0);
+        }
+        for remedy in REMEDIES {
+            let found = self.try_remedy(remedy, &law)?;
             if found != 0 {
                 return Ok(found);
             }
         }
-        Ok(chosen)
+        Ok(if law.stopped.is_some() { 0 } else { chosen })
     }
 
     /// Runs a law with less friction; its index if it is chosen, else the PID's.

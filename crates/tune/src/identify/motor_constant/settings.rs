@@ -1,4 +1,4 @@
-//! What a test of the motor constant is made of.
+//! The parts of a test of the motor constant.
 
 use crate::record::Recording;
 
