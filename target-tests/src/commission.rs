@@ -24,6 +24,7 @@ const FRICTION: StaticFrictionSettings = StaticFrictionSettings {
     stretch_mm: 5.0,
     settling_s: 0.3,
     two_sided: false,
+    acceleration_mm_s2: 500.0,
 };
 /// Largest relative error of the acceleration per volt that is found.
 const MAX_GAIN_ERROR: f64 = 0.1;

@@ -25,10 +25,11 @@ use quadrant_sim::setting_value::{Change, changes};
 use quadrant_sim::settings_file::SettingsFile;
 use quadrant_sim::stage_file::StageFile;
 use quadrant_tune::commission::{
-    CommissionError, CommissionSettings, Commissioned, CrossCheck, commission, plan,
+    CommissionError, CommissionSettings, Commissioned, CrossCheck, Watch, commission, plan,
 };
 use quadrant_tune::design::Target;
 use quadrant_tune::test_axis::{TestAxis, Travel};
+use quadrant_written::whole;
 use serde_json::{Value, json};
 
 use super::endpoint::{Endpoint, Simulation};
@@ -141,7 +142,7 @@ pub(super) struct Done {
 const SETTINGS: &str = "settings.toml";
 /// The folder for experiments of a commissioning that has not ended.
 const EXPERIMENTS: &str = "experiments";
-/// The file for settings of a PID that nothing was better than.
+/// The file for settings with the PID alone, written as soon as there is one.
 const PID_ALONE: &str = "settings-pid-alone.toml";
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -372,7 +373,16 @@ impl Job<'_> {
             for path in journal.foreign() {
                 warn!("{} was not written here, and stays", path.display());
             }
-            self.request.run(&mut journal, &base, output.seed)
+            let mut early = PidAlone {
+                file: file.clone(),
+                axis,
+                path: folder.file(PID_ALONE)?,
+                written: None,
+            };
+            let outcome = self
+                .request
+                .run(&mut journal, &base, output.seed, &mut early);
+            early.said_in(outcome)
         };
         let restored = machine.load(&before);
         let found = match outcome {
@@ -463,6 +473,55 @@ impl Job<'_> {
     }
 }
 
+/// The settings of the PID alone, in a file from when there is one: what ends early after it leaves an axis that can be driven.
+struct PidAlone {
+    file: SettingsFile,
+    axis: AxisName,
+    path: PathBuf,
+    written: Option<anyhow::Result<()>>,
+}
+
+impl PidAlone {
+    fn keep(&mut self, settings: &AxisSettings) {
+        self.file.stage.axes[self.axis as usize] = settings.clone();
+        self.written = Some(
+            self.file
+                .write(&self.path, whole::write)
+                .map_err(Into::into),
+        );
+    }
+
+    /// Says in an error where the settings are.
+    fn said_in<T>(self, outcome: anyhow::Result<T>) -> anyhow::Result<T> {
+        let path = self.path.display();
+        match (outcome, self.written) {
+            (Err(error), Some(Ok(()))) => {
+                Err(error.context(format!("the settings with the PID alone are in {path}")))
+            }
+            (Err(error), Some(Err(unwritten))) => Err(error.context(format!(
+                "the settings with the PID alone could not be written into {path}: {unwritten:#}"
+            ))),
+            (outcome, _) => outcome,
+        }
+    }
+}
+
+/// A progress bar, and the file of the PID.
+struct Watching<'a> {
+    report: &'a mut dyn FnMut(&'static str, f64),
+    pid: &'a mut PidAlone,
+}
+
+impl Watch for Watching<'_> {
+    fn progress(&mut self, step: &'static str, share: f64) {
+        (self.report)(step, share);
+    }
+
+    fn pid(&mut self, settings: &AxisSettings) {
+        self.pid.keep(settings);
+    }
+}
+
 impl Request {
     fn settings(&self) -> CommissionSettings {
         let margins = self.gain_margin_db.zip(self.phase_margin_deg);
@@ -522,12 +581,13 @@ impl Request {
         words
     }
 
-    /// Commissions the axis under test, and shows a progress bar.
+    /// Commissions the axis under test, shows a progress bar, and keeps the PID as soon as there is one.
     fn run(
         &self,
         test_axis: &mut dyn TestAxis,
         base: &AxisSettings,
         seed: u64,
+        pid: &mut PidAlone,
     ) -> anyhow::Result<Found> {
         let request = self.settings();
         let info = test_axis.info();
@@ -541,7 +601,11 @@ impl Request {
             bar.set_message(step);
             bar.set_position((1000.0 * done) as u64);
         };
-        let found = commission(test_axis, base, &request, &mut report)?;
+        let mut watch = Watching {
+            report: &mut report,
+            pid,
+        };
+        let found = commission(test_axis, base, &request, &mut watch)?;
         let checked = if self.quick {
             None
         } else {
@@ -905,6 +969,24 @@ mod tests {
             assert!(said.contains("--resume"), "{at}: {said}");
             assert!(Journal::count(&folder.path().join("x").join(EXPERIMENTS)) > 100);
         }
+    }
+
+    #[test]
+    fn what_ends_early_after_there_is_a_pid_leaves_its_settings_and_says_where() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut machine = Spoilt {
+            cut_at: Some("friction at"),
+            ..Spoilt::new()
+        };
+        let error = commission_into(folder.path(), &mut machine).err().unwrap();
+        let said = quadrant_cli::explained(&error);
+        let path = folder.path().join("x").join(PID_ALONE);
+        assert!(said.contains(&path.display().to_string()), "{said}");
+        let kept = SettingsFile::read(&path).unwrap().stage;
+        assert!(kept.axes[0].feedback.pid.kp_v_per_mm > 0.5);
+        assert!(kept.axes[0].plant.is_some());
+        kept.validate(quadrant_law::friction::gms::FIRMWARE_ELEMENTS)
+            .unwrap();
     }
 
     #[test]

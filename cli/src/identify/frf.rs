@@ -125,6 +125,7 @@ impl Measurement {
             bias_velocity_mm_s: self.velocity_mm_s(),
             open_loop: self.open_loop,
             two_sided: false,
+            ..FrfSettings::default()
         }
     }
 }

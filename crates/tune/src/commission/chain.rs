@@ -28,8 +28,23 @@ const STEPS: [(&str, f64); 6] = [
     ("verdict", 0.14),
 ];
 
+/// What watches a commissioning; a function of the step and the share of the whole sees how far it is.
+pub trait Watch {
+    /// Receives the step, and the share of the whole that is done, 0 to 1.
+    fn progress(&mut self, step: &'static str, share: f64);
+
+    /// Receives settings with the PID alone, finished but for trials, as soon as there is one, and again where a softer one takes its place.
+    fn pid(&mut self, _settings: &AxisSettings) {}
+}
+
+impl<F: FnMut(&'static str, f64)> Watch for F {
+    fn progress(&mut self, step: &'static str, share: f64) {
+        self(step, share);
+    }
+}
+
 /// Commissions an axis, unattended. Of `base` encoder, amplifier, limits and derivative filter count, not the gains and the
-/// friction. `progress` receives the step and the share of the whole.
+/// friction.
 ///
 /// # Errors
 /// The first step that fails, with the reason and a remedy; the axis is left at rest, its outputs off.
@@ -37,10 +52,10 @@ pub fn commission(
     test_axis: &mut dyn TestAxis,
     base: &AxisSettings,
     request: &CommissionSettings,
-    progress: &mut dyn FnMut(&'static str, f64),
+    watch: &mut dyn Watch,
 ) -> Result<Commissioned, CommissionError> {
     let mut guard = Guard::new(test_axis);
-    match guarded(&mut guard, base, request, progress) {
+    match guarded(&mut guard, base, request, watch) {
         Ok(found) => Ok(Commissioned {
             ran: guard.runs,
             ..found
@@ -60,19 +75,15 @@ fn guarded(
     test_axis: &mut Guard<'_>,
     base: &AxisSettings,
     request: &CommissionSettings,
-    progress: &mut dyn FnMut(&'static str, f64),
+    watch: &mut dyn Watch,
 ) -> Result<Commissioned, CommissionError> {
     let rate_hz = test_axis.info().rate_hz;
     let mut step = 0;
-    let mut report = |step: usize, share: f64| {
-        let before: f64 = STEPS[..step].iter().map(|(_, part)| part).sum();
-        progress(STEPS[step].0, before + share * STEPS[step].1);
-    };
 
     test_axis.apply(&zero_gain_settings(base))?;
     let steps = MotorConstantSettings::default().fitted_to(test_axis.info().first_room_mm());
     let motor = motor_constant::measure(test_axis, &steps, &mut |share| {
-        report(step, share);
+        report(watch, step, share);
     })?;
 
     step += 1;
@@ -82,7 +93,7 @@ fn guarded(
         plant,
         mut controller,
     } = linear_model(test_axis, base, request, &steps, motor, &mut |share| {
-        report(step, share);
+        report(watch, step, share);
     })?;
 
     step += 1;
@@ -93,9 +104,14 @@ fn guarded(
     let mut tried = false;
     let (map, recordings, friction) = loop {
         controller.put_into(&mut settings);
-        test_axis.apply(&measuring_settings(&settings))?;
+        let measuring = measuring_settings(&settings);
+        watch.pid(&AxisSettings {
+            limits: base.limits,
+            ..measuring.clone()
+        });
+        test_axis.apply(&measuring)?;
         let (map, recordings, found) = friction(test_axis, runs, &mut |share| {
-            report(step, share);
+            report(watch, step, share);
         })?;
         let uneven = map.runs.iter().filter(|run| run.stick_slip).count();
         let is_even = found.is_ok() && (uneven as f64) < MAX_UNEVEN_SHARE * map.runs.len() as f64;
@@ -110,7 +126,7 @@ fn guarded(
     let quiet = low_bandwidth_settings_on(&settings, &plant.plant, &process, rate_hz);
     let moving = runs.two_sided.then(|| measuring_settings(&settings));
     let (recording, gms) = presliding(test_axis, &friction, &quiet, moving, &mut |share| {
-        report(step, share);
+        report(watch, step, share);
     })?;
 
     step += 1;
@@ -135,7 +151,9 @@ fn guarded(
     step += 1;
     let mut softenings = 0;
     let verification = loop {
-        match verify(test_axis, &found.settings, &mut |share| report(step, share)) {
+        match verify(test_axis, &found.settings, &mut |share| {
+            report(watch, step, share)
+        }) {
             Err(error) if error.asks_for_softer() && softenings < models::MAX_SOFTENINGS => {
                 softenings += 1;
                 found.soften(&error, rate_hz);
@@ -146,6 +164,12 @@ fn guarded(
     found.settings = verification.settings(&found.settings);
     found.verification = Some(verification);
     Ok(found)
+}
+
+/// Reports the share of a step as that of the whole.
+fn report(watch: &mut dyn Watch, step: usize, share: f64) {
+    let before: f64 = STEPS[..step].iter().map(|(_, part)| part).sum();
+    watch.progress(STEPS[step].0, before + share * STEPS[step].1);
 }
 
 /// Share of uneven runs from which on the PID is checked for oscillation: of the simulated stage's axes 1/8 are uneven.

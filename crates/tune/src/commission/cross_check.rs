@@ -37,6 +37,8 @@ const EXCITATIONS: [(f64, f64); 5] = [
 ];
 /// Highest frequency of the excitation, Hz.
 const HIGHEST_HZ: f64 = 400.0;
+/// The same over the control rate.
+const BAND_SHARE: f64 = 0.36;
 /// Period of the excitation, s.
 const PERIOD_S: f64 = 0.5;
 /// Periods of the excitation.
@@ -58,10 +60,11 @@ impl CrossCheck {
         let sliding = &settings.friction.sliding;
         let breakaway_v =
             0.5 * (sliding.positive.curve.breakaway_v + sliding.negative.curve.breakaway_v);
+        let highest_hz = HIGHEST_HZ.min(BAND_SHARE * test_axis.info().rate_hz);
         let excitation = |(lowest_hz, ratio)| Excitation {
             waveform: Waveform::Multisine,
             rms_v: ratio * breakaway_v,
-            band_hz: (lowest_hz, HIGHEST_HZ),
+            band_hz: (lowest_hz, highest_hz),
             rise_hz: 0.0,
             period_s: PERIOD_S,
             seed,
@@ -80,7 +83,8 @@ impl CrossCheck {
             )
         };
         let strayed = |error: &ExperimentError| {
-            error.strayed() || error.fault() == Some(FaultCode::InjectionBounds)
+            let too_far = [FaultCode::InjectionBounds, FaultCode::EncoderJump];
+            error.strayed() || error.fault().is_some_and(|fault| too_far.contains(&fault))
         };
         let [first, others @ ..] = EXCITATIONS;
         let mut at_rest = measure(first);

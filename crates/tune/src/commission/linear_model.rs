@@ -298,14 +298,9 @@ const MIN_OSCILLATION_RATIO: f64 = 6.0;
 
 /// Parameters of the response that suit an axis, without its gain.
 pub(super) fn response_settings(info: &AxisInfo) -> FrfSettings {
-    let mut settings = FrfSettings::default().fitted_to(info.travel_mm);
-    let most_mm_s = BIAS_SHARE * info.max_velocity_mm_s;
-    settings.bias_velocity_mm_s = settings.bias_velocity_mm_s.min(most_mm_s);
-    settings
+    FrfSettings::default().fitted_to(info)
 }
 
-/// Share of the largest velocity that the bias of the response takes at most: the excitation comes on top.
-const BIAS_SHARE: f64 = 0.4;
 /// Acceleration per volt on which the usual excitation slides, mm/(V s^2): of the simulated stage's x axis.
 const USUAL_GAIN_MM_PER_V_S2: f64 = 69_390.0;
 /// Times that the excitation is halved before the response is given up.

@@ -20,7 +20,7 @@ mod quiet_pid;
 mod ringing;
 pub mod verify;
 
-pub use chain::commission;
+pub use chain::{Watch, commission};
 pub use commissioned::{CommissionSettings, Commissioned};
 pub use cross_check::CrossCheck;
 pub use drift::Drift;

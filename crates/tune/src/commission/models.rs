@@ -285,6 +285,8 @@ fn resolved(
     gms
 }
 
+/// Share of the identified stiffness that the control rate resolves, below which that is worth a note.
+const NOTED_STIFFNESS_SHARE: f64 = 0.8;
 /// Share of the largest value that the law resolves: just below 1, so that rounding loses none of it.
 const RESOLUTION_SHARE: f64 = 0.999;
 
@@ -351,7 +353,16 @@ impl Models {
             |found| found.gms.clone(),
         );
         let sliding = friction.models();
+        let identified_v_per_mm = elements.stiffness_v_per_mm();
         let elements = resolved(elements, &sliding, &plant.plant, rate_hz);
+        let resolved_v_per_mm = elements.stiffness_v_per_mm();
+        let mut remarks = controller.remarks.clone();
+        if gms.is_ok() && resolved_v_per_mm < NOTED_STIFFNESS_SHARE * identified_v_per_mm {
+            remarks.push(format!(
+                "Before it slides, the axis is as stiff as {identified_v_per_mm:.1} V/mm, and {rate_hz} Hz resolves \
+                 {resolved_v_per_mm:.1}: friction is fed forward as of a softer axis. A higher control rate would do better.",
+            ));
+        }
         settings.friction = with_all_models(sliding, elements);
         settings.feedforward.kind = FeedforwardKind::Combined;
         settings.feedforward.gains = FeedforwardGains {
@@ -372,7 +383,7 @@ impl Models {
             presliding: (gms, measurements.presliding),
             sector_bound: bound,
             settings,
-            remarks: controller.remarks,
+            remarks,
             ran: Vec::new(),
             verification: None,
         }

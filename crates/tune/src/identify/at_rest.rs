@@ -21,6 +21,8 @@ pub struct AtRest {
     /// The settings in force: the axis' own feedback, without feedforward.
     settings: AxisSettings,
     experiment: Experiment,
+    /// Rate of the control law, Hz.
+    rate_hz: f64,
     pub recording: Recording,
 }
 
@@ -50,6 +52,7 @@ impl AtRest {
             bias_velocity_mm_s: 0.0,
             open_loop: false,
             two_sided: false,
+            ..FrfSettings::default()
         };
         let rate_hz = test_axis.info().rate_hz;
         let mut experiment = standstill(&request, rate_hz);
@@ -60,6 +63,7 @@ impl AtRest {
             excitation,
             settings,
             experiment,
+            rate_hz,
             recording,
         })
     }
@@ -91,6 +95,7 @@ impl AtRest {
                 decimation: 1,
                 time_limit_s: 10.0 + 2.0 * recording.duration_s(),
             },
+            rate_hz,
             recording,
         };
         saved.response()?;
@@ -141,6 +146,7 @@ impl AtRest {
     fn with_measurement<T>(&self, use_it: impl FnOnce(&Measurement<'_>) -> T) -> T {
         use_it(&Measurement {
             experiment: &self.experiment,
+            rate_hz: self.rate_hz,
             settings: &self.settings,
             recording: &self.recording,
             estimate: &|recording| self.estimate(recording),

@@ -13,7 +13,7 @@ use quadrant_law::friction::FrictionSettings;
 use quadrant_law::friction::PerDirection;
 use quadrant_law::friction::gms::{GmsElement, GmsParameters};
 use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
-use quadrant_settings::{AxisSettings, SettingsError};
+use quadrant_settings::{AxisSettings, SettingsError, StageSettings};
 use quadrant_sim::plant::{AxisParameters, Drive, FrictionParameters, Imperfections};
 use rayon::prelude::*;
 
@@ -58,6 +58,8 @@ pub struct Measurement<'a> {
     /// The settings in force during the experiment.
     pub settings: &'a AxisSettings,
     pub recording: &'a Recording,
+    /// Rate of the control law, Hz.
+    pub rate_hz: f64,
     /// The estimator that made, and makes, a response of a recording.
     pub estimate: &'a (dyn Fn(&Recording) -> Option<FrequencyResponse> + Sync),
     /// Lowest coherence of a line that counts.
@@ -189,7 +191,11 @@ pub fn simulated_response(
     truth: AxisParameters,
 ) -> Result<FrequencyResponse, ReviseError> {
     // The candidate is without noise: the seed does not matter.
-    let mut test_axis = SimulatedTestAxis::new(0, truth, 0);
+    let stage = StageSettings {
+        rate_hz: measurement.rate_hz,
+        ..StageSettings::simulated()
+    };
+    let mut test_axis = SimulatedTestAxis::under(&stage, 0, truth, 0);
     test_axis.apply(measurement.settings)?;
     let recording = test_axis.perform(measurement.experiment, &mut |_| {})?;
     (measurement.estimate)(&recording).ok_or(ReviseError::NoResponse)

@@ -89,7 +89,7 @@ fn approach_once(test_axis: &mut dyn TestAxis, target_mm: f64) -> Result<f64, Ex
             drive: Drive::ClosedLoop(MotionSettings::PointToPoint(PointToPointSettings {
                 distance_mm,
                 max_velocity_mm_s: velocity_mm_s,
-                max_acceleration_mm_s2: ACCELERATION_MM_S2,
+                max_acceleration_mm_s2: ACCELERATION_MM_S2.min(info.max_acceleration_mm_s2),
                 max_jerk_mm_s3: JERK_MM_S3,
             })),
             injection_v: Vec::new(),

@@ -55,6 +55,8 @@ pub struct AxisInfo {
     pub start_mm: f64,
     /// Largest velocity, mm/s; an experiment that exceeds it is stopped.
     pub max_velocity_mm_s: f64,
+    /// Largest acceleration, mm/s^2; a motion that exceeds it is refused.
+    pub max_acceleration_mm_s2: f64,
 }
 
 impl AxisInfo {

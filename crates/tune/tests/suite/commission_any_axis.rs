@@ -8,7 +8,9 @@ use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::plant::{
     AxisParameters, Backlash, Drive, EncoderSide, FrictionParameters, StageParameters,
 };
-use quadrant_tune::commission::{CommissionSettings, Commissioned, Planned, commission, plan};
+use quadrant_tune::commission::{
+    CommissionSettings, Commissioned, CrossCheck, Planned, Watch, commission, plan,
+};
 use quadrant_tune::record::Recording;
 use quadrant_tune::test_axis::{
     AxisInfo, Drive as Driven, Experiment, ExperimentError, MachineError, SimulatedTestAxis,
@@ -25,6 +27,67 @@ fn commissioned(axis: AxisParameters, travel_mm: f64) -> Commissioned {
     let base = StageSettings::simulated().axes[0].clone();
     let request = CommissionSettings::default();
     commission(&mut test_axis, &base, &request, &mut |_, _| {}).unwrap()
+}
+
+/// What a commissioning reports: its steps, and the PID with the step in which it came.
+#[derive(Default)]
+struct Reported {
+    step: &'static str,
+    pid: Option<(&'static str, AxisSettings)>,
+}
+
+impl Watch for Reported {
+    fn progress(&mut self, step: &'static str, _share: f64) {
+        self.step = step;
+    }
+
+    fn pid(&mut self, settings: &AxisSettings) {
+        self.pid = Some((self.step, settings.clone()));
+    }
+}
+
+#[test]
+fn an_axis_is_commissioned_and_checked_at_other_rates_and_within_lower_limits() {
+    // Rate, largest velocity and acceleration.
+    let cases = [
+        (1e3, 200.0, 2e3),
+        (2e3, 100.0, 1e3),
+        (4e3, 200.0, 2e3),
+        (10e3, 60.0, 150.0),
+    ];
+    cases
+        .into_par_iter()
+        .for_each(|(rate_hz, velocity, acceleration)| {
+            let mut stage = StageSettings::simulated();
+            stage.rate_hz = rate_hz;
+            let base = &mut stage.axes[0];
+            base.limits.max_velocity_mm_s = velocity;
+            base.limits.max_acceleration_mm_s2 = acceleration;
+            base.feedback.pid.derivative_filter_s = 1.0 / rate_hz;
+            let base = base.clone();
+            let mut axis = SimulatedTestAxis::under(&stage, 0, x(), 1).with_travel_mm(100.0);
+            let mut reported = Reported::default();
+            let request = CommissionSettings::default();
+            let found = commission(&mut axis, &base, &request, &mut reported).unwrap();
+            let (step, pid) = reported.pid.unwrap();
+            assert_eq!(step, "frequency response", "{rate_hz} Hz");
+            assert_eq!(pid.feedforward.kind, FeedforwardKind::None);
+            assert_eq!(pid.limits, base.limits);
+            let verification = found.verification.as_ref().unwrap();
+            assert!(verification.is_better_than_pid(), "{:?}", found.notes());
+            let gain = found.plant.plant.gain_mm_per_v_s2 / x().gain_mm_per_v_s2;
+            assert!((gain - 1.0).abs() < 0.05, "{rate_hz} Hz: A {gain}");
+            let peak = found.margins.unwrap().sensitivity_peak;
+            assert!(peak < 1.71, "{rate_hz} Hz: {peak}");
+            // So slow an axis is excited too little for a revised model.
+            if rate_hz == 10e3 {
+                return;
+            }
+            let checked = CrossCheck::run(&mut axis, &found.settings, 1, &mut |_, _| {});
+            let checked = checked.unwrap_or_else(|error| panic!("{rate_hz} Hz: {error}"));
+            let agreement = checked.inertia_agreement(&found.settings).unwrap();
+            assert!((agreement - 1.0).abs() < 0.1, "{rate_hz} Hz: {agreement}");
+        });
 }
 
 /// Friction of an axis that is warm, over that of the cold one.

@@ -259,6 +259,7 @@ impl TestAxis for ConnectedAxis<'_> {
             travel_mm: self.travel.half_mm(),
             start_mm: self.travel.start_mm(),
             max_velocity_mm_s: settings.limits.max_velocity_mm_s,
+            max_acceleration_mm_s2: settings.limits.max_acceleration_mm_s2,
         }
     }
 

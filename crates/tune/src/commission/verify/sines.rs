@@ -78,6 +78,9 @@ const MOST_TRAVEL: f64 = 0.4;
 /// Largest velocity of a sine over the velocity limit.
 const MOST_VELOCITY: f64 = 0.5;
 
+/// Acceleration of a sine over the acceleration limit: it has more where it begins and ends.
+const MOST_ACCELERATION: f64 = 0.6;
+
 /// The sines that fit an axis.
 pub fn sines(info: &AxisInfo) -> Vec<SineTest> {
     SINES.iter().map(|sine| fitted(*sine, info)).collect()
@@ -96,10 +99,11 @@ pub(super) fn small_sines(info: &AxisInfo) -> Vec<SmallSine> {
 
 fn fitted(sine: SineTest, info: &AxisInfo) -> SineTest {
     let sine = sine.within(MOST_TRAVEL * info.travel_mm);
+    let accelerated_mm_s =
+        (MOST_ACCELERATION * info.max_acceleration_mm_s2 * sine.amplitude_mm).sqrt();
+    let most_mm_s = (MOST_VELOCITY * info.max_velocity_mm_s).min(accelerated_mm_s);
     SineTest {
-        velocity_mm_s: sine
-            .velocity_mm_s
-            .min(MOST_VELOCITY * info.max_velocity_mm_s),
+        velocity_mm_s: sine.velocity_mm_s.min(most_mm_s),
         ..sine
     }
 }

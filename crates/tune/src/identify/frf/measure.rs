@@ -9,7 +9,7 @@ use crate::identify::excitation::{Excitation, NoLine, Waveform};
 use crate::identify::setting::SettingError;
 use crate::record::Recording;
 use crate::test_axis::{
-    Drive, Experiment, ExperimentError, Sides, TestAxis, approach, approach_from,
+    AxisInfo, Drive, Experiment, ExperimentError, Sides, TestAxis, approach, approach_from,
 };
 
 /// Parameters of a frequency response measurement.
@@ -24,6 +24,8 @@ pub struct FrfSettings {
     pub open_loop: bool,
     /// Passes go through both sides of a short travel, from where the axis is taken before each.
     pub two_sided: bool,
+    /// Acceleration of the passes, mm/s^2; of an axis that has less, its largest.
+    pub acceleration_mm_s2: f64,
 }
 
 impl Default for FrfSettings {
@@ -42,6 +44,7 @@ impl Default for FrfSettings {
             bias_velocity_mm_s: 37.0,
             open_loop: false,
             two_sided: false,
+            acceleration_mm_s2: 500.0,
         }
     }
 }
@@ -104,32 +107,54 @@ const SETTLING_S: f64 = 0.7;
 const SHORT_SETTLING_S: f64 = 0.4;
 /// Periods in a block.
 const BLOCK_PERIODS: usize = 2;
-/// Acceleration of the passes, mm/s^2.
-const ACCELERATION_MM_S2: f64 = 500.0;
 /// Jerk of the passes, mm/s^3.
 const JERK_MM_S3: f64 = 2e4;
 /// Travel either way below which both sides are used and periods are shorter, mm.
 const SHORT_MM: f64 = 60.0;
 /// Factor on the period there.
 const SHORT_PERIOD: f64 = 0.5;
+/// Highest frequency that is chosen over the control rate.
+const BAND_SHARE: f64 = 0.36;
+/// Share of the largest velocity that the bias takes at most: the excitation comes on top.
+const BIAS_SHARE: f64 = 0.4;
 /// Slowest pass that is chosen for a short travel, mm/s.
 const SLOWEST_MM_S: f64 = 0.5;
 
 impl FrfSettings {
-    /// Slower passes where the travel, either way, does not hold one at the velocity.
+    /// Slower passes where travel or limits do not hold one at the velocity, and frequencies that the control rate resolves.
     #[must_use]
-    pub fn fitted_to(mut self, travel_mm: f64) -> Self {
+    pub fn fitted_to(self, axis: &AxisInfo) -> Self {
+        let travel_mm = axis.travel_mm;
+        let mut fitted = self.within(axis);
+        let (_, highest_hz) = &mut fitted.excitation.band_hz;
+        *highest_hz = highest_hz.min(BAND_SHARE * axis.rate_hz);
+        let most_mm_s = BIAS_SHARE * axis.max_velocity_mm_s;
+        fitted.bias_velocity_mm_s = fitted.bias_velocity_mm_s.min(most_mm_s);
         if travel_mm < SHORT_MM {
-            self.two_sided = true;
-            self.excitation.period_s *= SHORT_PERIOD;
-            self.excitation.band_hz.0 /= SHORT_PERIOD;
+            fitted.two_sided = true;
+            fitted.excitation.period_s *= SHORT_PERIOD;
+            fitted.excitation.band_hz.0 /= SHORT_PERIOD;
         }
-        while pass_length_mm(&self, 1) > self.room_mm(travel_mm)
-            && self.bias_velocity_mm_s > SLOWEST_MM_S
+        while pass_length_mm(&fitted, 1) > fitted.room_mm(travel_mm)
+            && fitted.bias_velocity_mm_s > SLOWEST_MM_S
         {
-            self.bias_velocity_mm_s *= 0.9;
+            fitted.bias_velocity_mm_s *= 0.9;
         }
-        self
+        fitted
+    }
+
+    /// The same with no more acceleration than the axis has.
+    fn within(self, axis: &AxisInfo) -> Self {
+        Self {
+            acceleration_mm_s2: self.acceleration_mm_s2.min(axis.max_acceleration_mm_s2),
+            ..self
+        }
+    }
+
+    /// Time in which a pass reaches its velocity, s.
+    fn ramp_s(&self) -> f64 {
+        self.bias_velocity_mm_s.abs() / self.acceleration_mm_s2
+            + self.acceleration_mm_s2 / JERK_MM_S3
     }
 
     /// Length of a pass at most, mm.
@@ -208,6 +233,7 @@ pub fn measure(
     progress: &mut dyn FnMut(f64),
 ) -> Result<FrfMeasurement, FrfError> {
     let axis = test_axis.info();
+    let settings = &settings.within(&axis);
     settings.check(axis.rate_hz)?;
     let moves = settings.bias_velocity_mm_s != 0.0;
     let mut recordings: Vec<Recording> = Vec::new();
@@ -340,8 +366,7 @@ fn pass_length_mm(settings: &FrfSettings, periods: usize) -> f64 {
     let speed = settings.bias_velocity_mm_s.abs();
     let steady_s = settling_s(settings.two_sided)
         + (periods + BLOCK_PERIODS) as f64 * settings.excitation.period_s;
-    let ramp_s = speed / ACCELERATION_MM_S2 + ACCELERATION_MM_S2 / JERK_MM_S3;
-    speed * (steady_s + ramp_s)
+    speed * (steady_s + settings.ramp_s())
 }
 
 /// One pass at constant velocity, and how many blocks it gives.
@@ -359,14 +384,13 @@ fn pass(
         .ok_or_else(|| too_short(settings, travel_mm))?;
     let length_mm = pass_length_mm(settings, periods);
     let speed = settings.bias_velocity_mm_s.abs();
-    let duration_s =
-        length_mm / speed + speed / ACCELERATION_MM_S2 + ACCELERATION_MM_S2 / JERK_MM_S3;
+    let duration_s = length_mm / speed + settings.ramp_s();
     // The motion begins a few control periods after the recording.
     let excited = ((duration_s + 0.1) / settings.excitation.period_s).ceil() as usize;
     let motion = PointToPointSettings {
         distance_mm: direction * length_mm,
         max_velocity_mm_s: speed,
-        max_acceleration_mm_s2: ACCELERATION_MM_S2,
+        max_acceleration_mm_s2: settings.acceleration_mm_s2,
         max_jerk_mm_s3: JERK_MM_S3,
     };
     let experiment = Experiment {

@@ -25,6 +25,8 @@ const JERK_MM_S3: f64 = 5e4;
 const SINE_AMPLITUDE_MM: f64 = 20.0;
 /// Largest velocity of the sine, mm/s.
 const SINE_VELOCITY_MM_S: f64 = 180.0;
+/// Velocity of the sine at most, over that of the largest acceleration: it is quicker where it begins and ends.
+const ACCELERATION_SHARE: f64 = 0.75;
 /// Cycles of the sine.
 const SINE_CYCLES: f64 = 8.0;
 /// Lead-in and lead-out of the sine, s.
@@ -49,14 +51,16 @@ pub fn shuttle(
             MotionSettings::PointToPoint(PointToPointSettings {
                 distance_mm,
                 max_velocity_mm_s: velocity_mm_s,
-                max_acceleration_mm_s2: ACCELERATION_MM_S2,
+                max_acceleration_mm_s2: ACCELERATION_MM_S2.min(info.max_acceleration_mm_s2),
                 max_jerk_mm_s3: JERK_MM_S3,
             })
         })
     });
+    let amplitude_mm = SINE_AMPLITUDE_MM.min(0.5 * room_mm);
+    let most_mm_s = ACCELERATION_SHARE * (amplitude_mm * info.max_acceleration_mm_s2).sqrt();
     let sine = MotionSettings::Harmonic(HarmonicSettings::with_velocity(
-        SINE_AMPLITUDE_MM.min(0.5 * room_mm),
-        SINE_VELOCITY_MM_S.min(fastest_mm_s),
+        amplitude_mm,
+        SINE_VELOCITY_MM_S.min(fastest_mm_s).min(most_mm_s),
         SINE_CYCLES,
         SINE_LEAD_S,
     ));

@@ -22,6 +22,8 @@ pub struct StaticFrictionSettings {
     pub settling_s: f64,
     /// Runs go through both sides of the travel: the axis stands at its negative end.
     pub two_sided: bool,
+    /// Acceleration of the moves, mm/s^2; of an axis that has less, its largest.
+    pub acceleration_mm_s2: f64,
 }
 
 impl Default for StaticFrictionSettings {
@@ -32,6 +34,7 @@ impl Default for StaticFrictionSettings {
             stretch_mm: 10.0,
             settling_s: 2.5,
             two_sided: false,
+            acceleration_mm_s2: 500.0,
         }
     }
 }
@@ -58,8 +61,6 @@ pub enum StaticFrictionError {
     Experiment(#[from] ExperimentError),
 }
 
-/// Acceleration of the moves, mm/s^2.
-const ACCELERATION_MM_S2: f64 = 500.0;
 /// Jerk of the moves, mm/s^3.
 const JERK_MM_S3: f64 = 2e4;
 /// Length of the stretch over a short travel.
@@ -85,6 +86,7 @@ impl StaticFrictionSettings {
     /// A shorter stretch, less settling and slower runs where travel or limits do not hold the fastest.
     #[must_use]
     pub fn fitted_to(mut self, axis: &AxisInfo) -> Self {
+        self = self.within(axis);
         self.two_sided = axis.travel_mm < SHORT_MM;
         let room_mm = self.room_mm(axis.travel_mm);
         if self.stretch_mm > STRETCH_SHARE * room_mm {
@@ -98,6 +100,19 @@ impl StaticFrictionSettings {
         }
         self.velocities_mm_s = (slowest, fastest);
         self
+    }
+
+    /// The same with no more acceleration than the axis has.
+    fn within(self, axis: &AxisInfo) -> Self {
+        Self {
+            acceleration_mm_s2: self.acceleration_mm_s2.min(axis.max_acceleration_mm_s2),
+            ..self
+        }
+    }
+
+    /// Time in which a run reaches its velocity, s.
+    fn ramp_s(&self, velocity_mm_s: f64) -> f64 {
+        velocity_mm_s / self.acceleration_mm_s2 + self.acceleration_mm_s2 / JERK_MM_S3
     }
 
     /// Length of a run at most, mm.
@@ -178,8 +193,7 @@ impl StaticFrictionSettings {
 
     /// The length of a run, mm: up to speed, settling, the stretch, and down again.
     fn length_mm(&self, velocity_mm_s: f64) -> f64 {
-        let ramp_s = velocity_mm_s / ACCELERATION_MM_S2 + ACCELERATION_MM_S2 / JERK_MM_S3;
-        self.stretch_mm + velocity_mm_s * (self.settling_s + 2.0 * ramp_s)
+        self.stretch_mm + velocity_mm_s * (self.settling_s + 2.0 * self.ramp_s(velocity_mm_s))
     }
 }
 
@@ -193,6 +207,7 @@ pub fn measure(
     progress: &mut dyn FnMut(f64),
 ) -> Result<(FrictionMap, Vec<Recording>), StaticFrictionError> {
     settings.check()?;
+    let settings = &settings.within(&test_axis.info());
     let travel_mm = settings.room_mm(test_axis.info().travel_mm);
     for velocity_mm_s in settings.velocities() {
         let needed_mm = settings.length_mm(velocity_mm_s);
@@ -220,7 +235,7 @@ pub fn measure(
                     drive: Drive::ClosedLoop(MotionSettings::PointToPoint(PointToPointSettings {
                         distance_mm: direction * length_mm,
                         max_velocity_mm_s: velocity_mm_s,
-                        max_acceleration_mm_s2: ACCELERATION_MM_S2,
+                        max_acceleration_mm_s2: settings.acceleration_mm_s2,
                         max_jerk_mm_s3: JERK_MM_S3,
                     })),
                     injection_v: Vec::new(),
@@ -253,7 +268,7 @@ pub(super) fn evaluate(
     resolution_mm: f64,
 ) -> Option<FrictionRun> {
     let direction = velocity_mm_s.signum();
-    let ramp_s = velocity_mm_s.abs() / ACCELERATION_MM_S2 + ACCELERATION_MM_S2 / JERK_MM_S3;
+    let ramp_s = settings.ramp_s(velocity_mm_s.abs());
     let end_mm = recording.reference_mm.last()? - 0.5 * velocity_mm_s * ramp_s;
     let begin_mm = end_mm - direction * settings.stretch_mm;
     let passed = |limit_mm: f64| {
