@@ -10,7 +10,9 @@ use quadrant_pages::design::pid::PidPage;
 use quadrant_pages::parts::provenance;
 use quadrant_tune::design::measured::MeasuredResponse;
 use quadrant_tune::design::step_response::{StepRequest, step_response};
-use quadrant_tune::design::{Form, INTEGRAL_SHARE, PidRequest, Process, Target, design_pid};
+use quadrant_tune::design::{
+    Form, INTEGRAL_SHARE, PidRequest, Process, Target, best_filter_s, best_pid, design_pid,
+};
 use quadrant_tune::identify::response::FrequencyResponse;
 
 use super::process::Model;
@@ -26,6 +28,12 @@ pub(crate) struct Arguments {
     /// Lowest coherence of a line of the response that counts.
     #[arg(long, default_value_t = 0.9)]
     least_coherence: f64,
+    /// The best PID, as `quadrant commission` makes it: on the loop as it runs, the least error after a step of the load with |S| up to 1.7 and
+    /// |T| up to 1.5, and without --filter-s the best filter.
+    #[arg(long, conflicts_with_all = [
+        "gain_margin_db", "phase_margin_deg", "crossover_hz", "sensitivity_peak", "ki", "design_on",
+    ])]
+    best: bool,
     /// Gain margin, dB. With a crossover and no --phase-margin-deg of its own, the smallest allowed.
     #[arg(long, value_name = "DB")]
     gain_margin_db: Option<f64>,
@@ -146,13 +154,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
     };
     let current = model.axis(&file).feedback.pid;
+    let usual_filter_s = match sampled {
+        Form::Sampled { sample_time_s, .. } if arguments.best => best_filter_s(1.0 / sample_time_s),
+        _ => current.derivative_filter_s,
+    };
     let request = PidRequest {
         target: arguments.target()?,
         form: match arguments.design_on {
             Shape::Continuous => Form::Continuous,
             Shape::Sampled => sampled,
         },
-        derivative_filter_s: arguments.filter_s.unwrap_or(current.derivative_filter_s),
+        derivative_filter_s: arguments.filter_s.unwrap_or(usual_filter_s),
         ki_v_per_mm_s: arguments.ki,
     };
     if !(1e-6..=1e-1).contains(&request.derivative_filter_s) {
@@ -166,7 +178,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     {
         bail!("--ki {ki}: it must be zero to a million V/(mm s)");
     }
-    let found = design_pid(&process, &request)?;
+    let found = if arguments.best {
+        best_pid(&process, sampled, request.derivative_filter_s)?
+    } else {
+        design_pid(&process, &request)?
+    };
 
     let forms = [
         ("continuous".to_owned(), Form::Continuous),

@@ -9,7 +9,8 @@ use super::guard::Guard;
 use super::linear_model::{HOME_MM, Linear, linear_model};
 use super::models::{self, Measurements, Models};
 use super::quiet_pid;
-use super::verify::verify;
+use super::rest::Knock;
+use super::verify::{Verification, verify};
 use crate::identify::motor_constant::{self, MotorConstantSettings};
 use crate::identify::static_friction::{
     self, FrictionFit, FrictionFitError, FrictionMap, StaticFrictionError, StaticFrictionSettings,
@@ -43,8 +44,8 @@ impl<F: FnMut(&'static str, f64)> Watch for F {
     }
 }
 
-/// Commissions an axis, unattended. Of `base` encoder, amplifier, limits and derivative filter count, not the gains and the
-/// friction.
+/// Commissions an axis, unattended. Of `base` encoder, amplifier and limits count, not the law and the friction; the derivative's filter,
+/// too, if the request has margins for the PID.
 ///
 /// # Errors
 /// The first step that fails, with the reason and a remedy; the axis is left at rest, its outputs off.
@@ -101,6 +102,13 @@ fn guarded(
     settings.plant = Some(plant.plant);
     settings.friction = models::rough_friction(motor.directed_v, &plant.plant, rate_hz);
     let runs = request.friction.fitted_to(&test_axis.info());
+    let knock = Knock {
+        friction_v: 0.5 * (motor.directed_v[0] + motor.directed_v[1]),
+        noise_mm: motor.noise_mm(),
+    };
+    quiet_pid::soften(test_axis, &settings, &mut controller, |axis, settings| {
+        knock.ringing(axis, settings)
+    })?;
     let mut tried = false;
     let (map, recordings, friction) = loop {
         controller.put_into(&mut settings);
@@ -115,7 +123,15 @@ fn guarded(
         })?;
         let uneven = map.runs.iter().filter(|run| run.stick_slip).count();
         let is_even = found.is_ok() && (uneven as f64) < MAX_UNEVEN_SHARE * map.runs.len() as f64;
-        if tried || is_even || !quiet_pid::soften(test_axis, &settings, &mut controller)? {
+        if tried
+            || is_even
+            || !quiet_pid::soften(
+                test_axis,
+                &settings,
+                &mut controller,
+                quiet_pid::on_slow_sine,
+            )?
+        {
             break (map, recordings, found?);
         }
         tried = true;
@@ -161,6 +177,25 @@ fn guarded(
             outcome => break outcome?,
         }
     };
+    let mut verification = verification;
+    let rest = |axis: &mut dyn TestAxis, found: &Commissioned, verification: &Verification| {
+        knock.ringing(axis, &verification.settings(&found.settings))
+    };
+    found.hums = rest(test_axis, &found, &verification)?;
+    if found.hums.is_some() && verification.is_better_than_pid() {
+        let chosen = std::mem::replace(&mut verification.chosen, 0);
+        let law = &verification.laws[chosen].law;
+        match rest(test_axis, &found, &verification)? {
+            None => {
+                found
+                    .remarks
+                    .push(format!("{law} hums at rest, and the PID alone does not."));
+                found.hums = None;
+            }
+            // No law is quieter: the better one stays.
+            Some(_) => verification.chosen = chosen,
+        }
+    }
     found.settings = verification.settings(&found.settings);
     found.verification = Some(verification);
     Ok(found)

@@ -4,6 +4,7 @@ use quadrant_settings::AxisSettings;
 use quadrant_sim::margins::{MarginError, Margins};
 
 use super::guard::Run;
+use super::ringing::Ringing;
 use super::verify::{Refused, Verification, WorseSine};
 use crate::design::Target;
 use crate::identify::frf::FrfMeasurement;
@@ -80,6 +81,8 @@ pub struct Commissioned {
     pub remarks: Vec<String>,
     /// What was run on the axis, in order; nothing of a commissioning from saved recordings.
     pub ran: Vec<Run>,
+    /// Oscillation at rest under the settings after a knock; none of an axis that came to rest, or on which no laws were tried.
+    pub hums: Option<Ringing>,
     /// Trials on the axis; none of a commissioning from saved recordings, or where none were asked for.
     pub verification: Option<Verification>,
 }
@@ -112,6 +115,14 @@ impl Commissioned {
         let mut notes = Vec::new();
         if !self.ran.is_empty() {
             notes.push(self.account());
+        }
+        if let Some(hum) = &self.hums {
+            notes.push(format!(
+                "At rest the axis hums at {:.0} Hz, by {:.1} um, once it is knocked, and so did softer PIDs: look for a loose coupling or play, or \
+                 ask for more distance with --gain-margin-db 14 --phase-margin-deg 60.",
+                hum.frequency_hz,
+                1e3 * hum.amplitude_mm,
+            ));
         }
         let shown = self.motor.gain_mm_per_v_s2 / self.plant.plant.gain_mm_per_v_s2;
         if !(1.0 / NOTED_MOTOR_RATIO..NOTED_MOTOR_RATIO).contains(&shown) {

@@ -17,6 +17,7 @@ mod models;
 mod own_stage;
 mod plan;
 mod quiet_pid;
+mod rest;
 mod ringing;
 pub mod verify;
 
@@ -29,4 +30,5 @@ pub use guard::{Guard, Run};
 pub use models::Measurements;
 pub use own_stage::{OwnStageError, commission_stage};
 pub use plan::{Planned, plan, stray_mm};
+pub use rest::Rest;
 pub use ringing::{Ringing, ringing};

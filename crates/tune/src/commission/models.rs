@@ -20,7 +20,9 @@ use super::error::CommissionError;
 use super::ringing::Ringing;
 use super::verify::VerifyError;
 use crate::design::npid::{NonlinearRule, Range, choose_nonlinear};
-use crate::design::{Form, PidRequest, Process, best_pid, design_pid, modal_pid, noise_voltage_v};
+use crate::design::{
+    Form, PidRequest, Process, best_filter_s, best_pid, design_pid, modal_pid, noise_voltage_v,
+};
 use crate::identify::frf::FrfMeasurement;
 use crate::identify::motor_constant::MotorConstant;
 use crate::identify::plant::{PlantFit, PlantFitSettings, Stiffness, fit_plant};
@@ -142,7 +144,8 @@ pub(super) fn controller(
         circle_bound: f64::INFINITY,
         remarks: Vec::new(),
     };
-    let filter_s = base.feedback.pid.derivative_filter_s;
+    let pid_filter_s = base.feedback.pid.derivative_filter_s;
+    let filter_s = pid_filter_s.min(best_filter_s(rate_hz));
     let Some(target) = request.target else {
         let form = sampled(rate_hz);
         let best = |filter_s: f64| -> Result<Controller, CommissionError> {
@@ -185,7 +188,7 @@ pub(super) fn controller(
     let design = PidRequest {
         target,
         form: Form::Continuous,
-        derivative_filter_s: filter_s,
+        derivative_filter_s: pid_filter_s,
         ki_v_per_mm_s: None,
     };
     Ok(alone(design_pid(&process(plant, &[]), &design)?.gains))
@@ -194,9 +197,9 @@ pub(super) fn controller(
 /// RMS voltage that the encoder's noise makes in the loop, over friction, from which on the derivative is filtered more.
 const MAX_NOISE_SHARE: f64 = 0.5;
 /// Factor on the filter's time constant for each further try.
-const FILTER_RATIO: f64 = 2.0;
+const FILTER_RATIO: f64 = std::f64::consts::SQRT_2;
 /// Largest number of these tries.
-const MAX_FILTER_STEPS: i32 = 5;
+const MAX_FILTER_STEPS: i32 = 10;
 
 /// The loop as it runs.
 pub(super) fn sampled(rate_hz: f64) -> Form {
@@ -385,6 +388,7 @@ impl Models {
             settings,
             remarks,
             ran: Vec::new(),
+            hums: None,
             verification: None,
         }
     }

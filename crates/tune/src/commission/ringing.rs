@@ -148,7 +148,7 @@ fn largest(errors: &[f64], growth_per_s: f64, sample_time_s: f64) -> Option<Ring
 }
 
 /// Values about the straight line through them.
-fn detrended(values: &[f64]) -> Vec<f64> {
+pub(super) fn detrended(values: &[f64]) -> Vec<f64> {
     let count = values.len() as f64;
     let middle = 0.5 * (count - 1.0);
     let mean = values.iter().sum::<f64>() / count;

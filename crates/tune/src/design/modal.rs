@@ -4,6 +4,10 @@
 //! with the least error after a step of the load ([`super::load_step_error`]) whose `|S|` and `|T|` stay within the bounds
 //! of [`super::best_pid`], and within wider ones when every mode lies 5 % lower or higher. Some modes need no filter, since the
 //! loop is fast or slow enough to leave them alone or has a phase there that damps them; a filter must pay for itself.
+//! With the encoder on the motor, the bounds also hold, a little wider, while friction holds the table and the motor swings on the
+//! spring alone: a PID for the sliding axis may hum there for ever.
+
+use std::f64::consts::TAU;
 
 use quadrant_law::control::filter::FilterSettings;
 use quadrant_law::control::pid::PidGains;
@@ -32,6 +36,8 @@ pub struct ModalDesign {
 const MODE_SHIFTS: [f64; 3] = [1.0, 0.95, 1.05];
 /// Bounds of the peaks for shifted modes, over those for the modes as they are.
 const SHIFTED_PEAK_RATIO: f64 = 1.25;
+/// The same with the table held by its friction: the motor alone then swings on the spring.
+const HELD_PEAK_RATIO: f64 = 1.25;
 /// Largest Ki Kd / Kp^2: with more, friction on the other side of a soft spring makes a limit cycle, which no linear bound shows.
 const MOST_INTEGRAL: f64 = 0.3;
 /// Frequencies about each mode, in its widths.
@@ -151,7 +157,7 @@ fn search(
     filter_s: f64,
     tighter: f64,
 ) -> Search {
-    let processes = MODE_SHIFTS.map(|shift| {
+    let mut processes = Vec::from(MODE_SHIFTS.map(|shift| {
         let modes: Vec<Mode> = modes.iter().map(|mode| mode.shifted(shift)).collect();
         let about = modes.iter().flat_map(frequencies_about).collect();
         let process = Process::Modelled {
@@ -165,7 +171,18 @@ fn search(
             SHIFTED_PEAK_RATIO
         };
         (process, wider * (1.0 - tighter), about)
-    });
+    }));
+    let held = modes.iter().filter_map(|mode| mode.held(plant));
+    processes.extend(held.map(|held| {
+        let hz = held.stiffness_per_s2.sqrt() / TAU;
+        let about = frequencies_about(&Mode {
+            frequency_hz: hz,
+            damping: 0.5 * held.damping_per_s / (TAU * hz),
+            anti: None,
+        });
+        let process = Process::filtered(held, filters);
+        (process, HELD_PEAK_RATIO * (1.0 - tighter), about)
+    }));
     Search::new(&processes, form, filter_s).with_integral_within(MOST_INTEGRAL)
 }
 

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
+use quadrant_law::control::plant_model::PlantModel;
 
 /// Least damping ratio of an anti-resonance at which the spring's own damper transmits force: it is no dip then.
 pub const MIN_TRANSMITTING_DAMPING: f64 = 0.5;
@@ -42,6 +43,21 @@ impl Mode {
             .is_some_and(|(_, damping)| damping < MIN_TRANSMITTING_DAMPING)
     }
 
+    /// The axis that the encoder on the motor sees while friction holds the table: the motor's own mass on the spring, which is damped by
+    /// the spring's damper. None of an encoder on the table, which sees nothing then.
+    pub fn held(&self, sliding: &PlantModel) -> Option<PlantModel> {
+        let (anti_hz, _) = self.anti.filter(|_| self.is_at_motor())?;
+        let (mode, anti) = (TAU * self.frequency_hz, TAU * anti_hz);
+        // The motor's share of the mass.
+        let share = (anti / mode).powi(2);
+        (share < 1.0).then(|| PlantModel {
+            gain_mm_per_v_s2: sliding.gain_mm_per_v_s2 / share,
+            damping_per_s: 2.0 * self.damping * mode * (1.0 - share),
+            stiffness_per_s2: mode * mode - anti * anti,
+            delay_s: sliding.delay_s,
+        })
+    }
+
     /// The mode at other frequencies by a factor, as when a mass on the axis has changed.
     #[must_use]
     pub fn shifted(&self, factor: f64) -> Self {
@@ -74,6 +90,33 @@ mod tests {
         };
         assert_eq!(mode.response(0.0), Complex64::new(1.0, 0.0));
         assert!((mode.response(TAU * 100.0).norm() - 50.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_held_table_leaves_the_motor_on_the_spring() {
+        // 1 kg and 3 kg on a spring of 1e5 N/m with a damper of 20 N s/m; a volt is a newton, lengths are m.
+        let (motor, table, spring, damper) = (1.0_f64, 3.0, 1e5, 20.0);
+        let both = 1.0 / motor + 1.0 / table;
+        let mode_rad_s = (spring * both).sqrt();
+        let anti_rad_s = (spring / table).sqrt();
+        let mode = Mode {
+            frequency_hz: mode_rad_s / TAU,
+            damping: 0.5 * damper * both / mode_rad_s,
+            anti: Some((anti_rad_s / TAU, 0.5 * damper / table / anti_rad_s)),
+        };
+        let sliding = PlantModel {
+            gain_mm_per_v_s2: 1.0 / (motor + table),
+            damping_per_s: 0.0,
+            stiffness_per_s2: 0.0,
+            delay_s: 1e-3,
+        };
+        let held = mode.held(&sliding).unwrap();
+        let near = |found: f64, expected: f64| (found / expected - 1.0).abs() < 1e-9;
+        assert!(near(held.gain_mm_per_v_s2, 1.0 / motor), "{held:?}");
+        assert!(near(held.stiffness_per_s2, spring / motor), "{held:?}");
+        assert!(near(held.damping_per_s, damper / motor), "{held:?}");
+        assert_eq!(held.delay_s, sliding.delay_s);
+        assert_eq!(Mode { anti: None, ..mode }.held(&sliding), None);
     }
 
     #[test]

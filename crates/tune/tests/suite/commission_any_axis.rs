@@ -457,3 +457,55 @@ fn an_axis_whose_first_test_is_quicker_than_its_spring_finds_its_model_on_a_shor
         }
     });
 }
+
+/// RMS deviation of the axis from its mean, mm, in each of the last five tenths of a second after it was knocked: the largest.
+fn after_a_knock(axis: &mut SimulatedTestAxis, knock_v: f64) -> f64 {
+    let mut injection_v = vec![knock_v; 40];
+    injection_v.resize(15_000, 0.0);
+    let held = Experiment {
+        name: "held".to_owned(),
+        drive: Driven::ClosedLoop(MotionSettings::Hold),
+        injection_v,
+        decimation: 1,
+        time_limit_s: 5.0,
+    };
+    let position_mm = axis.perform(&held, &mut |_| {}).unwrap().position_mm;
+    let tail = &position_mm[position_mm.len() - 5000..];
+    let deviation = |part: &[f64]| {
+        let mean = part.iter().sum::<f64>() / part.len() as f64;
+        let square = part.iter().map(|mm| (mm - mean).powi(2)).sum::<f64>();
+        (square / part.len() as f64).sqrt()
+    };
+    tail.chunks(1000).map(deviation).fold(0.0, f64::max)
+}
+
+#[test]
+fn an_axis_behind_a_spring_comes_to_rest_after_a_knock_or_is_said_to_hum() {
+    let cases = [60.0, 100.0, 150.0, 220.0, 300.0]
+        .into_iter()
+        .flat_map(|hz| [EncoderSide::Motor, EncoderSide::Load].map(|side| (hz, side)));
+    cases
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .for_each(|(frequency_hz, encoder)| {
+            let parameters = on_a_spring(x(), frequency_hz, encoder);
+            let found = commissioned(parameters.clone(), 200.0);
+            assert!(
+                found.hums.is_none(),
+                "{frequency_hz} {encoder:?}: {:?}",
+                found.notes()
+            );
+            for seed in [7, 8] {
+                let mut axis = SimulatedTestAxis::new(0, parameters.clone(), seed);
+                axis.apply(&found.settings).unwrap();
+                let count_mm = axis.info().resolution_mm;
+                for knock_v in [0.5, -0.8] {
+                    let counts = after_a_knock(&mut axis, knock_v) / count_mm;
+                    assert!(
+                        counts < 1.0,
+                        "{frequency_hz} Hz {encoder:?}: {counts} counts RMS"
+                    );
+                }
+            }
+        });
+}

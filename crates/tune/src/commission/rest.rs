@@ -1,0 +1,176 @@
+//! The axis at rest under a law: knocked to either side, and held.
+//!
+//! Friction may hold the table while the motor swings on a spring, or hold nothing that the encoder sees: a loop that is stable while the axis
+//! slides can hum there for ever. Only a knock starts it.
+
+use quadrant_law::reference::MotionSettings;
+use quadrant_settings::AxisSettings;
+
+use super::linear_model::HOME_MM;
+use super::ringing::{Ringing, detrended, ringing};
+use crate::test_axis::{Drive, Experiment, ExperimentError, MachineError, TestAxis, approach};
+
+/// Time for which the axis is left alone after a knock, s.
+const LEFT_ALONE_S: f64 = 1.2;
+/// Time at the end of it that counts, s.
+const COUNTED_S: f64 = 0.5;
+/// Length of the lines about which it is looked at, s: a few periods of the slowest hum.
+const PART_S: f64 = 0.1;
+/// Duration of a knock, s.
+const KNOCK_S: f64 = 5e-3;
+/// Voltage of a knock over friction.
+const KNOCK_RATIO: f64 = 3.0;
+/// Largest RMS deviation of an axis that is at rest, counts, beside the encoder's noise.
+const STILL_COUNTS: f64 = 1.0;
+/// Factor on the encoder's noise that a loop may make of it.
+const NOISE_RATIO: f64 = 2.0;
+
+/// Result of a test at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rest {
+    /// Largest RMS deviation after a knock, mm.
+    pub rms_mm: f64,
+    /// The oscillation, where the axis does not come to rest.
+    pub hum: Option<Ringing>,
+}
+
+/// Friction and noise of an axis, as far as a knock has to know them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Knock {
+    /// Friction, V.
+    pub(super) friction_v: f64,
+    /// Noise of the encoder, mm RMS.
+    pub(super) noise_mm: f64,
+}
+
+impl Knock {
+    /// The oscillation of an axis at rest under settings; none of one that comes to rest, or cannot be tested.
+    ///
+    /// # Errors
+    /// Settings that the machine refuses.
+    pub(super) fn ringing(
+        self,
+        test_axis: &mut dyn TestAxis,
+        settings: &AxisSettings,
+    ) -> Result<Option<Ringing>, MachineError> {
+        Ok(match self.test(test_axis, settings)? {
+            Ok(rest) => rest.hum,
+            // It swung so far that it was stopped.
+            Err(_) => test_axis.interrupted().and_then(ringing),
+        })
+    }
+
+    /// Applies settings, knocks the axis to either side in the middle of its travel, and looks whether it comes to rest.
+    ///
+    /// # Errors
+    /// A run that is stopped.
+    pub(super) fn test(
+        self,
+        test_axis: &mut dyn TestAxis,
+        settings: &AxisSettings,
+    ) -> Result<Result<Rest, ExperimentError>, MachineError> {
+        test_axis.apply(settings)?;
+        Ok(approach(test_axis, HOME_MM).and_then(|()| self.knocked(test_axis)))
+    }
+
+    fn knocked(self, test_axis: &mut dyn TestAxis) -> Result<Rest, ExperimentError> {
+        let info = test_axis.info();
+        let samples = |seconds: f64| ((seconds * info.rate_hz).round() as usize).max(1);
+        let (knock, alone) = (samples(KNOCK_S), samples(LEFT_ALONE_S));
+        let mut rest = Rest {
+            rms_mm: 0.0,
+            hum: None,
+        };
+        for sign in [1.0, -1.0] {
+            let mut injection_v = vec![sign * KNOCK_RATIO * self.friction_v; knock];
+            injection_v.resize(knock + alone, 0.0);
+            let experiment = Experiment {
+                name: "knock at rest".to_owned(),
+                drive: Drive::ClosedLoop(MotionSettings::Hold),
+                injection_v,
+                decimation: 1,
+                time_limit_s: 10.0,
+            };
+            let recording = test_axis.perform(&experiment, &mut |_| {})?;
+            let counted = (COUNTED_S / recording.sample_time_s) as usize;
+            let begin = recording.len().saturating_sub(counted);
+            let seen = Swing::of(&recording.position_mm[begin..], recording.sample_time_s);
+            let noise_mm = NOISE_RATIO * self.noise_mm;
+            let still_mm = (STILL_COUNTS * info.resolution_mm).hypot(noise_mm);
+            if seen.rms_mm > still_mm && seen.rms_mm > rest.rms_mm {
+                rest.hum = Some(seen.ringing());
+            }
+            rest.rms_mm = rest.rms_mm.max(seen.rms_mm);
+        }
+        Ok(rest)
+    }
+}
+
+/// Motion about straight lines, one after the other: what creeps is no hum.
+struct Swing {
+    rms_mm: f64,
+    frequency_hz: f64,
+}
+
+impl Swing {
+    fn of(position_mm: &[f64], sample_time_s: f64) -> Self {
+        let part = ((PART_S / sample_time_s) as usize).max(8);
+        let values: Vec<f64> = position_mm.chunks_exact(part).flat_map(detrended).collect();
+        let square: f64 = values.iter().map(|value| value * value).sum();
+        let crossings = values
+            .windows(2)
+            .filter(|pair| (pair[0] < 0.0) != (pair[1] < 0.0))
+            .count();
+        let lasts_s = values.len() as f64 * sample_time_s;
+        Self {
+            rms_mm: (square / values.len().max(1) as f64).sqrt(),
+            frequency_hz: 0.5 * crossings as f64 / lasts_s,
+        }
+    }
+
+    fn ringing(&self) -> Ringing {
+        Ringing {
+            frequency_hz: self.frequency_hz,
+            amplitude_mm: std::f64::consts::SQRT_2 * self.rms_mm,
+            share: 1.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use quadrant_sim::plant::{Backlash, Drive as DriveTrain, EncoderSide, StageParameters};
+
+    use super::*;
+    use crate::commission::bootstrap::measuring_settings;
+    use crate::test_axis::SimulatedTestAxis;
+
+    #[test]
+    fn a_rigid_axis_comes_to_rest_and_a_motor_on_a_spring_hums_at_its_own_frequency() {
+        let rigid = StageParameters::real().axes[0].clone();
+        let knock = Knock {
+            friction_v: 0.13,
+            noise_mm: rigid.imperfections.encoder_noise_mm,
+        };
+        let mut axis = SimulatedTestAxis::new(0, rigid.clone(), 1);
+        let settings = measuring_settings(axis.settings());
+        let still = knock.test(&mut axis, &settings).unwrap().unwrap();
+        assert_eq!(still.hum, None, "{still:?}");
+        // More than the rigid axis' best PID.
+        let mut sprung = rigid;
+        let gain = sprung.gain_mm_per_v_s2;
+        let spring = Backlash::resonating(150.0, 0.03, 0.5, gain, EncoderSide::Motor);
+        sprung.drive = DriveTrain::RackAndPinion(spring);
+        let mut axis = SimulatedTestAxis::new(0, sprung, 1);
+        let mut settings = settings;
+        settings.plant = None;
+        settings.feedback.pid.kp_v_per_mm = 1.61;
+        settings.feedback.pid.ki_v_per_mm_s = 173.0;
+        settings.feedback.pid.kd_v_s_per_mm = 6.55e-3;
+        let rest = knock.test(&mut axis, &settings).unwrap().unwrap();
+        let hum = rest.hum.unwrap();
+        // The motor on the spring, and on the loop.
+        assert!((120.0..220.0).contains(&hum.frequency_hz), "{hum:?}");
+        assert!(rest.rms_mm > 4.0 * axis.info().resolution_mm, "{rest:?}");
+    }
+}
