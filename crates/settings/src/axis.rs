@@ -99,6 +99,9 @@ pub struct FeedforwardSettings {
     pub gains: FeedforwardGains,
     /// Look-ahead of the feedforward over the feedback's reference, s: the plant's delay.
     pub preview_s: f64,
+    /// Largest velocity of motions to and fro on which no friction is fed forward, mm/s; from twice that on, all of it is.
+    #[serde(default)]
+    pub from_mm_s: f64,
     /// Learning of the friction's scale while the axis works; none: the scale stays 1.
     #[serde(default)]
     pub learning: Option<LearningSettings>,

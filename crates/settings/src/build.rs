@@ -235,11 +235,14 @@ impl AxisSettings {
             ))
             .plausibility(self.build_plausibility(period_s))
             .overload(amplifier.build_overload(period_s))
-            .oscillation(Oscillation::new(
-                feedforward.kind != FeedforwardKind::None,
-                limits.following_error_mm / encoder.resolution_mm,
-                period_s,
-            ))
+            .oscillation(
+                Oscillation::new(
+                    feedforward.kind != FeedforwardKind::None,
+                    limits.following_error_mm / encoder.resolution_mm,
+                    period_s,
+                )
+                .feeding_from(feedforward.from_mm_s * period_s / encoder.resolution_mm),
+            )
             .learning(self.build_learning(period_s))
             .cancelling(cancelling.as_ref().map(|(settings, of)| (settings, of)))
             .index_spacing(IndexSpacing::new(

@@ -225,6 +225,7 @@ impl Default for FeedforwardSettings {
                 inertia_v_s2_per_mm: default!("feedforward.gains.inertia_v_s2_per_mm"),
             },
             preview_s: default!("feedforward.preview_s"),
+            from_mm_s: default!("feedforward.from_mm_s"),
             learning: None,
             cancelling: None,
         }

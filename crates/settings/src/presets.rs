@@ -138,6 +138,7 @@ fn axis(parameters: &Parameters) -> AxisSettings {
         feedforward: FeedforwardSettings {
             kind: FeedforwardKind::Combined,
             preview_s: parameters.plant.delay_s,
+            from_mm_s: 0.0,
             learning: None,
             cancelling: None,
             ..FeedforwardSettings::default()

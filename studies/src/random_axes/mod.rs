@@ -4,6 +4,7 @@
 //! the PID that it designed. A result is one line of a CSV file, so that a campaign can be interrupted, divided and merged.
 
 pub mod cases;
+mod healthy;
 mod page;
 mod plant;
 mod subject;
@@ -25,7 +26,7 @@ use quadrant_sim::plant::StageParameters;
 use quadrant_sim::sine_test::SineTest;
 use quadrant_sim::stage_setup::StageSetup;
 use quadrant_tune::commission::bootstrap::{self, measuring_settings};
-use quadrant_tune::commission::verify::run_sine;
+use quadrant_tune::commission::verify::run_cycles;
 use quadrant_tune::commission::{CommissionError, CommissionSettings, Commissioned, commission};
 use quadrant_tune::design::DesignError;
 use quadrant_tune::identify::plant::PlantError;
@@ -35,6 +36,7 @@ use quadrant_tune::test_axis::{
 };
 use serde::{Deserialize, Serialize};
 
+use self::healthy::Health;
 use crate::campaign::{Campaign, Lines, make_folder};
 pub use plant::RandomAxis;
 pub use subject::Subject;
@@ -61,6 +63,9 @@ impl Campaign for Axes {
         "small_worse",
         "small_ratio",
         "small_sine",
+        "health_hum",
+        "health_faults",
+        "health_fault",
         "trial_worst",
         "gain_ratio",
         "feedforward",
@@ -117,6 +122,10 @@ pub enum Outcome {
     Refused,
     /// It ended early for another reason, though every axis of the campaign can be controlled.
     RefusedWrongly,
+    /// The axis hums at rest after a knock, and nothing said so.
+    Hums,
+    /// A fault ended a move within the limits.
+    FalseFault,
     /// The axis left its travel while it was commissioned, with any outcome.
     LeftTravel,
 }
@@ -132,6 +141,7 @@ pub struct Line {
     /// The PID's largest error of all judging sines, um.
     pub pid_um: Option<f64>,
     pub small: Small,
+    pub health: Health,
     /// Error over that of the PID, the worst of the trials by which the commissioning chose its law.
     pub trial_worst: Option<f64>,
     /// Acceleration per volt that was identified, over the true one.
@@ -405,6 +415,7 @@ fn judged(subject: &Subject, path: Path, judging: Judging) -> Judged {
         mean_ratio: None,
         pid_um: None,
         small: Small::default(),
+        health: Health::default(),
         trial_worst: None,
         gain_ratio: None,
         feedforward: String::new(),
@@ -516,6 +527,16 @@ impl Line {
         if judging == Judging::SmallToo && self.outcome == Outcome::Commissioned {
             self.judge_small(pair, is_worse);
         }
+        if judging == Judging::SmallToo {
+            let warmed = subject.warmed(used_s);
+            let parameters = warmed.unwrap_or_else(|| subject.parameters.clone());
+            self.health = Health::of(&found.settings, subject, &parameters);
+            if self.health.faults > 0 {
+                self.outcome = Outcome::FalseFault;
+            } else if self.health.hums() && found.hums.is_none() {
+                self.outcome = Outcome::Hums;
+            }
+        }
     }
 
     /// Judges the small slow sines. `pair` runs one, and gives the largest error and that of the PID, mm.
@@ -557,6 +578,15 @@ impl Line {
     }
 }
 
+/// Cycles of a sine that are scored: an axis that sticks does not do the same in each.
+fn cycles(sine: &SineTest) -> usize {
+    let period_s = std::f64::consts::TAU * sine.amplitude_mm / sine.velocity_mm_s;
+    ((SCORED_S / period_s) as usize).clamp(2, 12)
+}
+
+/// Time that is scored, s, where that is no fewer than two cycles.
+const SCORED_S: f64 = 40.0;
+
 /// Largest error on a sine, mm, of a fresh axis with other noise.
 fn largest(
     settings: &AxisSettings,
@@ -572,7 +602,7 @@ fn largest(
     axis.apply(settings).map_err(|error| error.to_string())?;
     let fitted = sine.within(MOST_TRAVEL * travel_mm);
     approach(&mut axis, 0.0)
-        .and_then(|()| run_sine(&mut axis, "judging", fitted, &mut |_| {}))
+        .and_then(|()| run_cycles(&mut axis, "judging", fitted, cycles(&fitted), &mut |_| {}))
         .map(|(score, _)| score.largest_mm)
         .map_err(|error| error.to_string())
 }

@@ -57,6 +57,23 @@ pub(super) fn print(lines: &Lines<Line>) {
         },
     );
     list_worst(
+        "Faults of healthy axes",
+        lines,
+        |line| (line.health.faults > 0).then_some(line.health.faults as f64),
+        |line| {
+            format!(
+                "{} of the moves: {}: {}",
+                line.health.faults, line.health.fault, line.axis
+            )
+        },
+    );
+    list_worst(
+        "Hum at rest, over a count and the noise",
+        lines,
+        |line| line.health.hum.filter(|ratio| *ratio > 1.0),
+        |line| format!("{:.1}: {}", line.health.hum.unwrap_or(f64::NAN), line.axis),
+    );
+    list_worst(
         "Worse when small",
         lines,
         |line| (line.small.worse > 0).then_some(line.small.worse as f64),

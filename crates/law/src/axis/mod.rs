@@ -324,6 +324,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             error: reference.wrapping_sub(seen.measured.0),
             reference,
             sense: i8::from(seen.velocity > S::ZERO) - i8::from(seen.velocity < S::ZERO),
+            speed: state.displacement.0.unsigned_abs().min(u64::from(u32::MAX)) as u32,
             excited: (state.injected != S::ZERO) | (state.mode() == MotionMode::OpenLoop),
         };
         self.oscillation.step(&mut state.oscillation, input)
@@ -747,6 +748,10 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let Some(mut taken) = state.rest.set_off(integral) else {
             return;
         };
+        // What friction that is not fed forward took over would be lost.
+        if state.oscillation.is_reduced() {
+            return;
+        }
         if self.learns {
             taken = self.learning.unscaled(&state.learning, taken);
         }

@@ -1,6 +1,6 @@
 //! The monitor for oscillation: a loop that swings by itself, or that its own feedforward makes swing.
 //!
-//! It sees the tracking error and the reference in whole counts, every fourth tick, and finds three things:
+//! It sees the tracking error and the reference in whole counts, every fourth tick, and finds four things:
 //!
 //! - **The friction feedforward harms.** While the reference goes to and fro, the error swings by more than the distance that the
 //!   reference goes. A friction feedforward does this if it pushes an axis whose friction is smaller than identified, or is behind a
@@ -9,6 +9,8 @@
 //!   strokes, or 20 s. After the third time it stays off until the settings change or the outputs are off. If it was not the cause, now or
 //!   while it is off, the axis is shaken from outside: the feedforward returns at once, and there is no other trial for a minute. It also
 //!   returns at once with a stroke more than twice as long, in which it need not harm.
+//! - **Slow motions**, where the settings say that friction fed forward does harm there: it fades within 50 ms by the largest speed of the
+//!   reference in this stroke and the one before, so that a reversal of a fast motion still has all of it.
 //! - **Hum.** At rest, the error swings evenly at 20 Hz or more for a second. It is reported, and nothing is done.
 //! - **Instability.** The error swings evenly for a second, each time by more than a limit and by more than twice the distance
 //!   that the reference goes meanwhile. That is a fault.
@@ -61,6 +63,13 @@ const HUM_HALF_CYCLES: u32 = 40;
 /// Least half cycles of an instability in a window.
 const UNSTABLE_HALF_CYCLES: u32 = 6;
 
+/// A count, 2^-16 counts.
+const ONE_COUNT: f64 = (1_u32 << 16) as f64;
+/// Fraction bits of a number of steps.
+const STEPS_SHIFT: u32 = 24;
+/// A step with them.
+const STEPS_SCALE: f64 = (1_u32 << STEPS_SHIFT) as f64;
+
 /// Bound of errors and distances, counts.
 const MOST_COUNTS: i64 = 1 << 24;
 
@@ -81,6 +90,9 @@ pub struct Oscillation<S: Scalar> {
     window_looks: u32,
     /// Swing that is a fault, counts; the largest number for none.
     unstable_counts: u32,
+    /// Speed of strokes on which no friction is fed forward, 2^-16 counts a tick, and steps for each unit above it, 2^-24.
+    slow: u32,
+    steps_per_speed: u32,
     /// Share of what is added in a step.
     share: S::Gain,
 }
@@ -123,6 +135,8 @@ pub struct OscillationInput {
     pub reference: i64,
     /// Sense in which the reference moves: -1, 0 or 1.
     pub sense: i8,
+    /// Displacement of the reference in a tick, 2^-16 counts, in either sense.
+    pub speed: u32,
     /// The axis is excited on purpose.
     pub excited: bool,
 }
@@ -148,6 +162,9 @@ enum Phase {
 pub struct OscillationState {
     /// Steps by which the friction fed forward is reduced.
     reduced: u8,
+    /// The same because the motion is slow.
+    faded: u8,
+    speeds: Speeds,
     phase: Phase,
     /// Looks in the phase, and until the next trial.
     looks: u32,
@@ -163,6 +180,16 @@ pub struct OscillationState {
     stroke_before: Stroke,
     turns: Turns,
     reading: OscillationReading,
+}
+
+/// Largest speeds of the reference, 2^-16 counts a tick: in this stroke and the one before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Speeds {
+    sense: i8,
+    most: u32,
+    most_before: u32,
+    /// Looks since it came to rest.
+    rested: u32,
 }
 
 /// The way of the reference in one sense, and of the error meanwhile.
@@ -237,8 +264,22 @@ impl<S: Scalar> Oscillation<S> {
             trial_looks: looks(TRIAL_S),
             window_looks: looks(WINDOW_S),
             unstable_counts: rounding::round(unstable_counts) as u32,
+            slow: 0,
+            steps_per_speed: 0,
             share: S::gain(1.0 / steps, Quantity::Integer, Quantity::Multiplier),
         }
+    }
+
+    /// The same, which leaves out the friction feedforward on strokes up to so many counts a tick, and has all of it from twice that on. Settings
+    /// time only.
+    #[must_use]
+    pub fn feeding_from(mut self, counts_per_tick: f64) -> Self {
+        let slow = rounding::round(counts_per_tick * ONE_COUNT).min(f64::from(u32::MAX / 2));
+        self.slow = slow as u32;
+        self.steps_per_speed =
+            rounding::round(f64::from(REDUCTION_STEPS) * STEPS_SCALE / slow.max(1.0))
+                .min(f64::from(u32::MAX)) as u32;
+        self
     }
 
     /// A monitor that finds nothing.
@@ -252,7 +293,10 @@ impl<S: Scalar> Oscillation<S> {
 
     /// The share of the friction feedforward that acts, a [`Quantity::Multiplier`], while it is reduced.
     pub fn share(&self, state: &OscillationState) -> S {
-        S::scale_integer(i32::from(REDUCTION_STEPS - state.reduced), self.share)
+        S::scale_integer(
+            i32::from(REDUCTION_STEPS - state.reduced.max(state.faded)),
+            self.share,
+        )
     }
 
     /// Looks at the axis; returns false if it is not stable.
@@ -273,8 +317,40 @@ impl<S: Scalar> Oscillation<S> {
         let reference = input.reference as i32;
         if self.feeds_friction {
             self.follow(state, error, reference, input.sense);
+            if self.slow > 0 {
+                self.fade(state, input.sense, input.speed);
+            }
         }
         self.count(state, error, reference, input.sense != 0)
+    }
+
+    /// Fades the friction feedforward by the largest speed in this stroke and the one before; at rest it stays.
+    #[cold]
+    #[inline(never)]
+    fn fade(&self, state: &mut OscillationState, sense: i8, speed: u32) {
+        let speeds = &mut state.speeds;
+        if sense == 0 {
+            speeds.rested = speeds.rested.saturating_add(1);
+            if speeds.rested >= self.window_looks {
+                (speeds.most, speeds.most_before) = (0, 0);
+            }
+            return;
+        }
+        speeds.rested = 0;
+        if sense != speeds.sense {
+            speeds.sense = sense;
+            speeds.most_before = core::mem::replace(&mut speeds.most, 0);
+        }
+        speeds.most = speeds.most.max(speed);
+        let fastest = speeds.most.max(speeds.most_before);
+        let missing = (self.slow * 2).saturating_sub(fastest).min(self.slow);
+        let steps = (u64::from(missing) * u64::from(self.steps_per_speed)) >> STEPS_SHIFT;
+        let wanted = steps.min(u64::from(REDUCTION_STEPS)) as u8;
+        let (least, most) = (
+            state.faded.saturating_sub(self.steps_per_look),
+            state.faded.saturating_add(self.steps_per_look),
+        );
+        state.faded = wanted.clamp(least, most);
     }
 
     /// Follows the strokes of the reference, and reduces or restores the friction feedforward.
@@ -444,7 +520,7 @@ impl OscillationReading {
 impl OscillationState {
     /// True while less than all of the friction feedforward acts.
     pub fn is_reduced(&self) -> bool {
-        self.reduced > 0
+        self.reduced.max(self.faded) > 0
     }
 
     /// The oscillation that was found last.

@@ -364,6 +364,8 @@ struct Shown {
     monitor: Oscillation<f32>,
     state: OscillationState,
     forth: bool,
+    /// Displacement of the reference in a tick, 2^-16 counts.
+    speed: u32,
 }
 
 impl Shown {
@@ -373,6 +375,7 @@ impl Shown {
             monitor: Oscillation::new(true, 1e6, 1e-4),
             state: OscillationState::default(),
             forth: false,
+            speed: 0,
         };
         shown.strokes(4, 80, 100);
         shown.strokes(8, 80, 50);
@@ -390,6 +393,7 @@ impl Shown {
                     error: swing * part / 125,
                     reference: way * part / 125,
                     sense: if self.forth { 1 } else { -1 },
+                    speed: self.speed,
                     excited: false,
                 };
                 assert!(self.monitor.step(&mut self.state, input));
@@ -437,4 +441,73 @@ fn strokes_of_another_kind_say_nothing_of_what_was_taken_away() {
     shown.strokes(8, 50, 50);
     assert_eq!(shown.acts(), 1.0);
     assert_eq!(shown.state.reading().number, 0);
+}
+
+/// Displacement in a tick of a number of counts, 2^-16 counts.
+const fn counts(thousandths: u32) -> u32 {
+    (thousandths << 16) / 1000
+}
+
+#[test]
+fn friction_is_fed_forward_by_the_fastest_of_two_strokes_and_stays_as_it_is_at_rest() {
+    // Nothing below 0.4 counts a tick, all from 0.8 on.
+    let mut shown = Shown {
+        monitor: Oscillation::new(true, 1e6, 1e-4).feeding_from(0.4),
+        state: OscillationState::default(),
+        forth: false,
+        speed: counts(300),
+    };
+    shown.strokes(1, 80, 10);
+    assert_eq!(shown.acts(), 0.0, "from rest");
+    // It comes with the first fast stroke, and is there through the reversal after it.
+    for (speed, share) in [(counts(900), 1.0), (counts(100), 1.0), (counts(100), 0.0)] {
+        shown.speed = speed;
+        shown.strokes(1, 80, 10);
+        assert_eq!(shown.acts(), share, "{speed}");
+    }
+    shown.speed = counts(600);
+    shown.strokes(1, 80, 10);
+    assert!((shown.acts() - 0.5).abs() < 0.02, "{}", shown.acts());
+    let half = shown.acts();
+    let at_rest = OscillationInput {
+        error: 0,
+        reference: 0,
+        sense: 0,
+        speed: 0,
+        excited: false,
+    };
+    for _ in 0..2 * 2500 {
+        shown.monitor.step(&mut shown.state, at_rest);
+    }
+    assert_eq!(shown.acts(), half, "at rest");
+    // After a second at rest, what went before does not count.
+    shown.speed = counts(100);
+    shown.strokes(1, 80, 10);
+    assert_eq!(shown.acts(), 0.0);
+    // It fades over 50 ms, not at once.
+    shown.speed = counts(2000);
+    let mut share = shown.acts();
+    let input = OscillationInput {
+        sense: 1,
+        speed: counts(2000),
+        ..at_rest
+    };
+    for _ in 0..125 {
+        shown.monitor.step(&mut shown.state, input);
+        assert!(shown.acts() - share < 0.011, "{share}");
+        share = shown.acts();
+    }
+    assert_eq!(share, 1.0);
+}
+
+#[test]
+fn an_axis_whose_settings_say_nothing_of_slow_motions_feeds_friction_forward_on_all_of_them() {
+    let mut shown = Shown {
+        monitor: Oscillation::new(true, 1e6, 1e-4).feeding_from(0.0),
+        state: OscillationState::default(),
+        forth: false,
+        speed: 1,
+    };
+    shown.strokes(3, 80, 10);
+    assert_eq!(shown.acts(), 1.0);
 }

@@ -107,7 +107,8 @@ fn guarded(
         noise_mm: motor.noise_mm(),
     };
     quiet_pid::soften(test_axis, &settings, &mut controller, |axis, settings| {
-        knock.ringing(axis, settings)
+        let seen = knock.ringing(axis, settings)?;
+        Ok(seen.filter(|(_, is_loud)| *is_loud).map(|(hum, _)| hum))
     })?;
     let mut tried = false;
     let (map, recordings, friction) = loop {
@@ -181,8 +182,9 @@ fn guarded(
     let rest = |axis: &mut dyn TestAxis, found: &Commissioned, verification: &Verification| {
         knock.ringing(axis, &verification.settings(&found.settings))
     };
-    found.hums = rest(test_axis, &found, &verification)?;
-    if found.hums.is_some() && verification.is_better_than_pid() {
+    let seen = rest(test_axis, &found, &verification)?;
+    found.hums = seen.map(|(hum, _)| hum);
+    if seen.is_some_and(|(_, is_loud)| is_loud) && verification.is_better_than_pid() {
         let chosen = std::mem::replace(&mut verification.chosen, 0);
         let law = &verification.laws[chosen].law;
         match rest(test_axis, &found, &verification)? {

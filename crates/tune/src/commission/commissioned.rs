@@ -118,8 +118,8 @@ impl Commissioned {
         }
         if let Some(hum) = &self.hums {
             notes.push(format!(
-                "At rest the axis hums at {:.0} Hz, by {:.1} um, once it is knocked, and so did softer PIDs: look for a loose coupling or play, or \
-                 ask for more distance with --gain-margin-db 14 --phase-margin-deg 60.",
+                "At rest the axis hums at {:.0} Hz, by {:.1} um, once it is knocked. If that is too much, look for a loose coupling or play, or \
+                 ask for a softer PID with --gain-margin-db 14 --phase-margin-deg 60.",
                 hum.frequency_hz,
                 1e3 * hum.amplitude_mm,
             ));

@@ -22,6 +22,8 @@ const KNOCK_S: f64 = 5e-3;
 const KNOCK_RATIO: f64 = 3.0;
 /// Largest RMS deviation of an axis that is at rest, counts, beside the encoder's noise.
 const STILL_COUNTS: f64 = 1.0;
+/// RMS deviation from which on a softer loop is worth its larger errors, counts.
+const LOUD_COUNTS: f64 = 3.0;
 /// Factor on the encoder's noise that a loop may make of it.
 const NOISE_RATIO: f64 = 2.0;
 
@@ -44,7 +46,7 @@ pub(super) struct Knock {
 }
 
 impl Knock {
-    /// The oscillation of an axis at rest under settings; none of one that comes to rest, or cannot be tested.
+    /// The oscillation of an axis at rest under settings, and if it is too much to leave it; none of one that comes to rest, or cannot be tested.
     ///
     /// # Errors
     /// Settings that the machine refuses.
@@ -52,11 +54,17 @@ impl Knock {
         self,
         test_axis: &mut dyn TestAxis,
         settings: &AxisSettings,
-    ) -> Result<Option<Ringing>, MachineError> {
+    ) -> Result<Option<(Ringing, bool)>, MachineError> {
+        let count_mm = test_axis.info().resolution_mm;
         Ok(match self.test(test_axis, settings)? {
-            Ok(rest) => rest.hum,
+            Ok(rest) => rest
+                .hum
+                .map(|hum| (hum, rest.rms_mm > LOUD_COUNTS * count_mm)),
             // It swung so far that it was stopped.
-            Err(_) => test_axis.interrupted().and_then(ringing),
+            Err(_) => test_axis
+                .interrupted()
+                .and_then(ringing)
+                .map(|hum| (hum, true)),
         })
     }
 
@@ -98,7 +106,9 @@ impl Knock {
             let noise_mm = NOISE_RATIO * self.noise_mm;
             let still_mm = (STILL_COUNTS * info.resolution_mm).hypot(noise_mm);
             if seen.rms_mm > still_mm && seen.rms_mm > rest.rms_mm {
-                rest.hum = Some(seen.ringing());
+                // The encoder's noise hides the turns of a slow one.
+                let swing = recording.slice(begin..recording.len());
+                rest.hum = ringing(&swing).or(Some(seen.ringing()));
             }
             rest.rms_mm = rest.rms_mm.max(seen.rms_mm);
         }

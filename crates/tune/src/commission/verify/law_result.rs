@@ -49,6 +49,16 @@ pub struct LawResult {
 }
 
 impl LawResult {
+    /// The same with the scores of some of its sines, by their indices, as far as it ran on them.
+    pub(super) fn only(&self, sines: &[usize]) -> Self {
+        let ran = || sines.iter().filter(|&&index| index < self.scores.len());
+        Self {
+            scores: ran().map(|&index| self.scores[index]).collect(),
+            at_s: ran().map(|&index| self.at_s[index]).collect(),
+            ..self.clone()
+        }
+    }
+
     /// Its kind of feedforward.
     pub(super) fn kind(&self) -> FeedforwardKind {
         self.settings.feedforward.kind

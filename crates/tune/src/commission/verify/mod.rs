@@ -15,7 +15,7 @@ use quadrant_sim::sine_test::SineTest;
 use self::bench::Bench;
 pub use self::law_result::LawResult;
 use self::sines::{CHOICE_SINES, COMPARISON_SINES, SCORED_CYCLES, one_lasts_s, small_sines};
-pub use self::sines::{run_sine, sines};
+pub use self::sines::{run_cycles, run_sine, sines};
 pub use self::small::{Refused, WorseSine};
 use self::trials::{KINDS, MOST_RUNS, REPEATS, Trials};
 use super::drift::Drift;

@@ -63,14 +63,16 @@ const fn small(amplitude_mm: f64, velocity_mm_s: f64, scored_cycles: usize) -> S
 }
 
 /// Small slow sines, on which no law may be worse than the PID. What throws a table behind a spring depends on the frequency: the short
-/// sines are at 3 to 10 Hz, and many of their cycles count, for an axis that sticks does not do the same in each. The last one is slow: it
-/// shows an axis that meets less friction at such a speed than is fed forward.
-pub(super) const SMALL_SINES: [SmallSine; 6] = [
+/// sines are at 3 to 10 Hz, and many of their cycles count, for an axis that sticks does not do the same in each. The last ones are slow: they
+/// show an axis that meets less friction at such a speed than is fed forward.
+pub(super) const SMALL_SINES: [SmallSine; 8] = [
     small(0.02, 1.2, 9),
     small(0.03, 0.9, 9),
     small(0.03, 1.4, 9),
     small(0.05, 1.0, 9),
     small(0.05, 1.4, 9),
+    small(0.02, 0.35, 9),
+    small(0.1, 0.35, 3),
     small(0.18, 0.2, 1),
 ];
 /// Largest amplitude of a sine over the travel.
@@ -140,7 +142,10 @@ pub fn run_sine(
 }
 
 /// [`run_sine`] over a number of scored cycles.
-pub(super) fn run_cycles(
+///
+/// # Errors
+/// A run that is stopped.
+pub fn run_cycles(
     test_axis: &mut dyn TestAxis,
     law: &str,
     sine_test: SineTest,

@@ -53,21 +53,11 @@ pub(super) fn flattened(settings: &AxisSettings, share: f64) -> AxisSettings {
     })
 }
 
-/// The same settings with the lower one of both levels, of which a `share` is left at rest; of the rest, 63 % is back at a speed.
-pub(super) fn lessened_when_slow(
-    settings: &AxisSettings,
-    share: f64,
-    speed_mm_s: f64,
-) -> AxisSettings {
-    with_curves(settings, |curve| {
-        let level_v = curve.coulomb_v.min(curve.breakaway_v);
-        StribeckCurve {
-            coulomb_v: level_v,
-            breakaway_v: share * level_v,
-            stribeck_velocity_mm_s: speed_mm_s,
-            exponent: 1.0,
-        }
-    })
+/// The same settings with friction fed forward from a velocity on, mm/s.
+pub(super) fn feeding_from(settings: &AxisSettings, from_mm_s: f64) -> AxisSettings {
+    let mut changed = settings.clone();
+    changed.feedforward.from_mm_s = from_mm_s;
+    changed
 }
 
 fn with_curves(

@@ -25,8 +25,8 @@ const JERK_MM_S3: f64 = 5e4;
 const SINE_AMPLITUDE_MM: f64 = 20.0;
 /// Largest velocity of the sine, mm/s.
 const SINE_VELOCITY_MM_S: f64 = 180.0;
-/// Velocity of the sine at most, over that of the largest acceleration: it is quicker where it begins and ends.
-const ACCELERATION_SHARE: f64 = 0.75;
+/// Factor on its velocity for each try, while it asks for more acceleration than the axis has.
+const SLOWING: f64 = 0.9;
 /// Cycles of the sine.
 const SINE_CYCLES: f64 = 8.0;
 /// Lead-in and lead-out of the sine, s.
@@ -57,13 +57,14 @@ pub fn shuttle(
         })
     });
     let amplitude_mm = SINE_AMPLITUDE_MM.min(0.5 * room_mm);
-    let most_mm_s = ACCELERATION_SHARE * (amplitude_mm * info.max_acceleration_mm_s2).sqrt();
-    let sine = MotionSettings::Harmonic(HarmonicSettings::with_velocity(
-        amplitude_mm,
-        SINE_VELOCITY_MM_S.min(fastest_mm_s).min(most_mm_s),
-        SINE_CYCLES,
-        SINE_LEAD_S,
-    ));
+    let at = |velocity_mm_s: f64| {
+        HarmonicSettings::with_velocity(amplitude_mm, velocity_mm_s, SINE_CYCLES, SINE_LEAD_S)
+    };
+    let mut velocity_mm_s = SINE_VELOCITY_MM_S.min(fastest_mm_s);
+    while MotionSettings::Harmonic(at(velocity_mm_s)).peaks().1 > info.max_acceleration_mm_s2 {
+        velocity_mm_s *= SLOWING;
+    }
+    let sine = MotionSettings::Harmonic(at(velocity_mm_s));
     let round: Vec<MotionSettings> = there_and_back.chain([sine]).collect();
     let motions: Vec<MotionSettings> = (0..rounds).flat_map(|_| round.clone()).collect();
     let mut joined = Recording::default();
