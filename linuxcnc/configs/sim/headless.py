@@ -1,0 +1,46 @@
+#!/usr/bin/python3
+"""Runs the part program of an INI file without a screen: [DISPLAY]DISPLAY of the check."""
+import sys, time
+import linuxcnc
+
+ini = linuxcnc.ini(sys.argv[sys.argv.index("-ini") + 1])
+status, command, errors = linuxcnc.stat(), linuxcnc.command(), linuxcnc.error_channel()
+
+
+def poll():
+    status.poll()
+    told = errors.poll()
+    if told:
+        print("linuxcnc:", told[1], flush=True)
+        sys.exit(1)
+
+
+def wait(done, seconds, what):
+    end = time.monotonic() + seconds
+    poll()
+    while not done():
+        if time.monotonic() > end:
+            print("linuxcnc: waited in vain:", what, flush=True)
+            sys.exit(1)
+        time.sleep(0.02)
+        poll()
+
+
+command.state(linuxcnc.STATE_ESTOP_RESET)
+wait(lambda: status.task_state != linuxcnc.STATE_ESTOP, 5, "emergency stop reset")
+command.state(linuxcnc.STATE_ON)
+wait(lambda: status.task_state == linuxcnc.STATE_ON, 5, "machine on")
+time.sleep(0.3)
+command.mode(linuxcnc.MODE_MANUAL)
+command.wait_complete()
+command.home(-1)
+wait(lambda: all(status.homed[:3]), 10, "homed")
+command.mode(linuxcnc.MODE_AUTO)
+command.wait_complete()
+command.program_open(ini.find("DISPLAY", "OPEN_FILE"))
+command.wait_complete()
+command.auto(linuxcnc.AUTO_RUN, 0)
+time.sleep(0.5)
+wait(lambda: status.interp_state == linuxcnc.INTERP_IDLE and status.inpos, 120, "program")
+wait(lambda: status.task_state == linuxcnc.STATE_ON, 0.1, "machine still on")
+print("done", flush=True)
