@@ -9,6 +9,7 @@ use std::path::Path;
 use anyhow::{Result, ensure};
 use clap::Parser;
 use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::friction::gms::GmsParameters;
 use quadrant_law::learning::LearningSettings;
 use quadrant_settings::StageSettings;
 use quadrant_sim::identified_stage::identified_settings;
@@ -140,8 +141,42 @@ fn settings_at(rate_hz: f64) -> Result<StageSettings> {
         let filter_s = &mut axis.feedback.pid.derivative_filter_s;
         *filter_s = filter_s.max(0.5 / rate_hz);
         axis.feedforward.learning = Some(LearningSettings::DEFAULT);
+        // Nothing uses them, and they would be checked against the rate.
+        (axis.friction.dahl, axis.friction.lugre) = (None, None);
+        if let Some(plant) = axis.plant {
+            soften(
+                &mut axis.friction.gms,
+                plant.stiffest_v_per_mm(1.0 / rate_hz),
+            );
+        }
     }
     Ok(with_best_pid(&settings)?)
+}
+
+/// Makes the stiffest elements softer until their sum is what a rate resolves.
+fn soften(gms: &mut GmsParameters, most_v_per_mm: f64) {
+    let total = |cap: f64| -> f64 {
+        let capped = gms
+            .elements
+            .iter()
+            .map(|element| element.stiffness_v_per_mm.min(cap));
+        capped.sum()
+    };
+    let (mut low, mut high) = (0.0, gms.stiffness_v_per_mm());
+    if high <= most_v_per_mm {
+        return;
+    }
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if total(middle) < most_v_per_mm {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    for element in &mut gms.elements {
+        element.stiffness_v_per_mm = element.stiffness_v_per_mm.min(low);
+    }
 }
 
 fn check(folder: &Path, with_delay: bool) -> Result<()> {
@@ -249,7 +284,8 @@ fn main() -> Result<()> {
     }
     if options.check {
         session::make_user()?;
-        let temporary = tempfile::tempdir()?;
+        // Not below /tmp, which each session has for itself.
+        let temporary = tempfile::tempdir_in("/var/tmp")?;
         let folder = options.keep.as_deref().unwrap_or(temporary.path());
         std::fs::create_dir_all(folder)?;
         xtask::command::run_quietly(xtask::command::command("chmod").arg("755").arg(folder))?;

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use quadrant_settings::StageSettings;
 use quadrant_sim::settings_file::SettingsFile;
 use xtask::command;
@@ -131,7 +131,7 @@ pub(crate) fn start(session: &Session, folder: &Path) -> Result<Running> {
     // Temporary files and the control's lock lie below /tmp, shared memory and ports in their own spaces.
     let script = format!(
         "ip link set lo up; mount -t proc proc /proc; mkdir -p {0}/tmp && chown {USER} {0}/tmp && mount --bind {0}/tmp /tmp; \
-         cd {0} && exec runuser -u {USER} -- env HOME={0} DISPLAY= timeout {TIMEOUT_S} linuxcnc {0}/machine.ini",
+         cd {0} && exec runuser -u {USER} -- env HOME={0} DISPLAY= timeout {TIMEOUT_S} linuxcnc -r {0}/machine.ini",
         folder.display()
     );
     let log = fs::File::create(folder.join("log"))?;
@@ -155,15 +155,14 @@ impl Running {
     /// Waits for its end; returns the folder with its record.
     pub(crate) fn finish(mut self) -> Result<PathBuf> {
         let status = self.child.wait()?;
-        let log = fs::read_to_string(self.folder.join("log"))?;
+        let text = |name| fs::read_to_string(self.folder.join(name)).unwrap_or_default();
+        let result = text("result");
         ensure!(
-            log.lines().any(|line| line == "done"),
-            "{}: {status}:\n{log}",
-            self.name
+            result.trim() == "done" && self.folder.join("record").exists(),
+            "{}: {status}: {result}{}",
+            self.name,
+            text("log")
         );
-        if !self.folder.join("record").exists() {
-            bail!("{}: no record:\n{log}", self.name);
-        }
         Ok(self.folder)
     }
 }

@@ -1,18 +1,25 @@
 #!/usr/bin/python3
 """Runs the part program of an INI file without a screen: [DISPLAY]DISPLAY of the check."""
-import sys, time
+import os, sys, time
 import linuxcnc
 
-ini = linuxcnc.ini(sys.argv[sys.argv.index("-ini") + 1])
+ini_file = sys.argv[sys.argv.index("-ini") + 1]
+ini = linuxcnc.ini(ini_file)
 status, command, errors = linuxcnc.stat(), linuxcnc.command(), linuxcnc.error_channel()
+
+
+def end(words):
+    """Leaves how it ended beside the INI file: what is printed goes elsewhere."""
+    with open(os.path.join(os.path.dirname(ini_file), "result"), "w") as result:
+        print(words, file=result)
+    sys.exit()
 
 
 def poll():
     status.poll()
-    told = errors.poll()
-    if told:
-        print("linuxcnc:", told[1], flush=True)
-        sys.exit(1)
+    error = errors.poll()
+    if error:
+        end(error[1])
 
 
 def wait(done, seconds, what):
@@ -20,8 +27,7 @@ def wait(done, seconds, what):
     poll()
     while not done():
         if time.monotonic() > end:
-            print("linuxcnc: waited in vain:", what, flush=True)
-            sys.exit(1)
+            end("waited in vain: " + what)
         time.sleep(0.02)
         poll()
 
@@ -43,4 +49,4 @@ command.auto(linuxcnc.AUTO_RUN, 0)
 time.sleep(0.5)
 wait(lambda: status.interp_state == linuxcnc.INTERP_IDLE and status.inpos, 120, "program")
 wait(lambda: status.task_state == linuxcnc.STATE_ON, 0.1, "machine still on")
-print("done", flush=True)
+end("done")
