@@ -44,6 +44,9 @@ struct Options {
     /// Keep what the check leaves, in this folder
     #[arg(long, requires = "check")]
     keep: Option<std::path::PathBuf>,
+    /// Judge again what an earlier check has kept
+    #[arg(long, requires = "keep")]
+    again: bool,
     /// Also delay the loop's reference by the preview instead of extrapolating it
     #[arg(long, requires = "check")]
     delay: bool,
@@ -179,7 +182,7 @@ fn soften(gms: &mut GmsParameters, most_v_per_mm: f64) {
     }
 }
 
-fn check(folder: &Path, with_delay: bool) -> Result<()> {
+fn check(folder: &Path, with_delay: bool, again: bool) -> Result<()> {
     let loops = &LOOPS[..LOOPS.len() - usize::from(!with_delay)];
     let mut sessions = Vec::new();
     for rate_hz in RATES_HZ {
@@ -198,14 +201,19 @@ fn check(folder: &Path, with_delay: bool) -> Result<()> {
         }
     }
     let mut scores = Vec::new();
+    let mut judge = |session: &Session, folder: &Path| -> Result<()> {
+        let record = score::read(&folder.join("record"))?;
+        scores.push(score::judge(&record, session.settings.rate_hz));
+        Ok(())
+    };
+    if again { for session in &sessions { judge(session, &folder.join(&session.name))?; } return report(loops, &scores); }
     for wave in sessions.chunks(AT_A_TIME) {
         let running: Vec<_> = wave
             .iter()
             .map(|session| session::start(session, folder))
             .collect::<Result<_>>()?;
         for (session, running) in wave.iter().zip(running) {
-            let record = score::read(&running.finish()?.join("record"))?;
-            scores.push(score::judge(&record, session.settings.rate_hz));
+            judge(session, &running.finish()?)?;
         }
     }
     report(loops, &scores)
@@ -276,7 +284,7 @@ fn main() -> Result<()> {
         return install::uninstall();
     }
     install::require_linuxcnc(options.check)?;
-    if options.install || options.check {
+    if options.install || options.check && !options.again {
         install::install()?;
     }
     if options.run {
@@ -289,7 +297,7 @@ fn main() -> Result<()> {
         let folder = options.keep.as_deref().unwrap_or(temporary.path());
         std::fs::create_dir_all(folder)?;
         xtask::command::run_quietly(xtask::command::command("chmod").arg("755").arg(folder))?;
-        return check(&folder.canonicalize()?, options.delay);
+        return check(&folder.canonicalize()?, options.delay, options.again);
     }
     Ok(())
 }

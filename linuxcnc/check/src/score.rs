@@ -6,11 +6,10 @@ use std::path::Path;
 use anyhow::Result;
 use quadrant_linuxcnc::plant::Recorded;
 
-/// The part program's circles: centre and radius, mm.
-const CENTRE_MM: [f64; 2] = [10.0, 0.0];
+/// Radius of the part program's circles, mm.
 const RADIUS_MM: f64 = 10.0;
-/// Largest distance of a command from the circle that it is on, mm.
-const ON_CIRCLE_MM: f64 = 1e-4;
+/// Largest distance of a command from the circle that it is on, mm: the path tolerance of the part program.
+const ON_CIRCLE_MM: f64 = 1e-3;
 /// Time after a reversal in which its spike is looked for, s.
 const SPIKE_S: f64 = 0.15;
 
@@ -50,11 +49,22 @@ pub(crate) fn read(path: &Path) -> Result<Vec<Recorded>> {
 
 /// Judges a record of a thread of `rate_hz`.
 pub(crate) fn judge(record: &[Recorded], rate_hz: f64) -> Score {
-    let radius = |point: [f64; 3]| (point[0] - CENTRE_MM[0]).hypot(point[1] - CENTRE_MM[1]);
-    let on_circle = record
+    // Homing sets the origin to within a count or two: the circles are where the commands go.
+    let furthest = |axis: usize, sense: f64| {
+        let along = record.iter().map(|[command, _]| sense * command[axis]);
+        sense * along.fold(f64::MIN, f64::max)
+    };
+    let centre_mm = [
+        furthest(0, 1.0) - RADIUS_MM,
+        0.5 * (furthest(1, 1.0) + furthest(1, -1.0)),
+    ];
+    let radius = |point: [f64; 3]| (point[0] - centre_mm[0]).hypot(point[1] - centre_mm[1]);
+    let radii: Vec<f64> = record
         .iter()
-        .filter(|[command, _]| (radius(*command) - RADIUS_MM).abs() < ON_CIRCLE_MM);
-    let radii: Vec<f64> = on_circle.map(|[_, position]| radius(*position)).collect();
+        .map(|[command, position]| (radius(*command), radius(*position)))
+        .filter(|(command, _)| (command - RADIUS_MM).abs() < ON_CIRCLE_MM)
+        .map(|(command, position)| position - command)
+        .collect();
     let most = radii.iter().copied().fold(f64::MIN, f64::max);
     let least = radii.iter().copied().fold(f64::MAX, f64::min);
     let mut largest = 0.0_f64;
