@@ -283,7 +283,6 @@ impl Board {
             let command_mm = seen.position_cmd * self.options.unit_mm;
             let command = CommandPins {
                 ahead_mm: command_mm - position_mm,
-                position_mm: command_mm,
                 velocity_mm_s: seen.velocity_cmd * self.options.unit_mm,
             };
             if !(command.ahead_mm.is_finite() && command.velocity_mm_s.is_finite()) {

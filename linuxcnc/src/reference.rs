@@ -28,9 +28,7 @@ pub enum Preview {
 pub struct CommandPins {
     /// Distance of the command from the joint's feedback.
     pub ahead_mm: f64,
-    /// The command itself: only its changes count, where there is no velocity.
-    pub position_mm: f64,
-    /// Velocity, mm/s; zero, too, where the pin is not connected.
+    /// Its velocity, mm/s.
     pub velocity_mm_s: f64,
 }
 
@@ -43,8 +41,7 @@ pub struct CommandReference {
     extrapolated_s: f64,
     /// Ticks by which the command is delayed besides the axis' own preview, so that all joints lag by the same.
     delay_ticks: Option<usize>,
-    /// The command of the last tick: mm, 2^-16 counts of the law, and mm/s.
-    position_mm: f64,
+    /// The command of the last tick, 2^-16 counts of the law, and its velocity.
     units: f64,
     velocity_mm_s: f64,
     past: [ReferenceSample<f32>; MOST_DELAY_TICKS + 1],
@@ -79,7 +76,6 @@ impl CommandReference {
                 0.0
             },
             delay_ticks: (!extrapolates).then_some(wait_ticks.min(MOST_DELAY_TICKS)),
-            position_mm: 0.0,
             units: 0.0,
             velocity_mm_s: 0.0,
             past: [ReferenceSample::default(); MOST_DELAY_TICKS + 1],
@@ -89,15 +85,7 @@ impl CommandReference {
 
     /// One tick. `measured` is the joint's count in this tick; `begins`: no earlier command counts.
     pub fn step(&mut self, pins: CommandPins, measured: i64, begins: bool) -> Led {
-        let moved_mm = pins.position_mm - self.position_mm;
-        self.position_mm = pins.position_mm;
-        let velocity = if begins {
-            0.0
-        } else if pins.velocity_mm_s == 0.0 {
-            moved_mm * self.rate_hz
-        } else {
-            pins.velocity_mm_s
-        };
+        let velocity = if begins { 0.0 } else { pins.velocity_mm_s };
         let acceleration = if begins {
             0.0
         } else {

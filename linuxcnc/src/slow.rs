@@ -98,10 +98,7 @@ pub(crate) struct Started {
 pub(crate) fn start(place: &Place<'_>) -> io::Result<Started> {
     let defaults = match place.defaults {
         Some(path) => SettingsFile::read(path).map_err(io::Error::other)?.stage,
-        None => StageSettings {
-            rate_hz: place.rate_hz,
-            ..StageSettings::default()
-        },
+        None => uncommissioned(place.rate_hz),
     };
     let open = |path| FlashFile::open(path, memory_flash::BYTES);
     let file = place.store.map(open).transpose()?;
@@ -144,6 +141,19 @@ pub(crate) fn start(place: &Place<'_>) -> io::Result<Started> {
             thread: Some(thread),
         },
     })
+}
+
+/// The settings of a machine that nobody has commissioned, at a rate.
+fn uncommissioned(rate_hz: f64) -> StageSettings {
+    let mut settings = StageSettings {
+        rate_hz,
+        ..StageSettings::default()
+    };
+    for axis in &mut settings.axes {
+        let filter_s = &mut axis.feedback.pid.derivative_filter_s;
+        *filter_s = filter_s.max(0.5 / rate_hz);
+    }
+    settings
 }
 
 /// What the thread owns.

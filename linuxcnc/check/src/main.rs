@@ -9,7 +9,6 @@ use std::path::Path;
 use anyhow::{Result, ensure};
 use clap::Parser;
 use quadrant_law::feedforward::FeedforwardKind;
-use quadrant_law::friction::gms::GmsParameters;
 use quadrant_law::learning::LearningSettings;
 use quadrant_settings::StageSettings;
 use quadrant_sim::identified_stage::identified_settings;
@@ -156,32 +155,6 @@ fn settings_at(rate_hz: f64) -> Result<StageSettings> {
     Ok(with_best_pid(&settings)?)
 }
 
-/// Makes the stiffest elements softer until their sum is what a rate resolves.
-fn soften(gms: &mut GmsParameters, most_v_per_mm: f64) {
-    let total = |cap: f64| -> f64 {
-        let capped = gms
-            .elements
-            .iter()
-            .map(|element| element.stiffness_v_per_mm.min(cap));
-        capped.sum()
-    };
-    let (mut low, mut high) = (0.0, gms.stiffness_v_per_mm());
-    if high <= most_v_per_mm {
-        return;
-    }
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if total(middle) < most_v_per_mm {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    for element in &mut gms.elements {
-        element.stiffness_v_per_mm = element.stiffness_v_per_mm.min(low);
-    }
-}
-
 fn check(folder: &Path, with_delay: bool, again: bool) -> Result<()> {
     let loops = &LOOPS[..LOOPS.len() - usize::from(!with_delay)];
     let mut sessions = Vec::new();
@@ -206,7 +179,12 @@ fn check(folder: &Path, with_delay: bool, again: bool) -> Result<()> {
         scores.push(score::judge(&record, session.settings.rate_hz));
         Ok(())
     };
-    if again { for session in &sessions { judge(session, &folder.join(&session.name))?; } return report(loops, &scores); }
+    if again {
+        for session in &sessions {
+            judge(session, &folder.join(&session.name))?;
+        }
+        return report(loops, &scores);
+    }
     for wave in sessions.chunks(AT_A_TIME) {
         let running: Vec<_> = wave
             .iter()
