@@ -145,12 +145,6 @@ fn settings_at(rate_hz: f64) -> Result<StageSettings> {
         axis.feedforward.learning = Some(LearningSettings::DEFAULT);
         // Nothing uses them, and they would be checked against the rate.
         (axis.friction.dahl, axis.friction.lugre) = (None, None);
-        if let Some(plant) = axis.plant {
-            soften(
-                &mut axis.friction.gms,
-                plant.stiffest_v_per_mm(1.0 / rate_hz),
-            );
-        }
     }
     Ok(with_best_pid(&settings)?)
 }
