@@ -1,4 +1,6 @@
 /* The realtime component `quadrant`: exports pins, copies them to the law's structure and back. `man 9 quadrant`. */
+#include <unistd.h>
+
 #include "rtapi.h"
 #include "rtapi_app.h"
 #include "rtapi_string.h"
@@ -52,6 +54,8 @@ static int comp_id;
 static hal_quadrant_t *hal;
 static struct Board *board;
 static struct QuadrantPins pins;
+/* The component is being unloaded. */
+static volatile int ends;
 
 static int has(int axis) { return strchr(joints, axes[axis]) != NULL; }
 
@@ -59,6 +63,7 @@ static void update(void *arg, long period)
 {
     int n;
 
+    if (ends) return;
     pins.now_ns = rtapi_get_time();
     pins.period_ns = period;
     pins.estop = *hal->estop;
@@ -148,7 +153,9 @@ void rtapi_app_exit(void)
 {
     int n;
 
-    /* The function is taken out of its thread first; what the pins show last is zero. */
+    /* A period under way ends, none begins, and zero is what the signals keep. */
+    ends = 1;
+    usleep(20000);
     for (n = 0; n < 3; n++)
         if (has(n)) *hal->joint[n].output = 0.0;
     *hal->driven = 0;
