@@ -39,6 +39,7 @@ typedef struct {
     hal_float_t *position_cmd, *velocity_cmd, *position_fb;
     hal_s32_t *rawcounts;
     hal_bit_t *enable, *amp_fault;
+    hal_float_t *gains[4];
     hal_float_t *output, *ff_level, *ff_viscous, *ff_presliding, *ff_inertia, *error, *learning;
     hal_bit_t *faulted;
     hal_s32_t *fault;
@@ -50,6 +51,7 @@ typedef struct {
 } hal_quadrant_t;
 
 static const char axes[] = "xyz";
+static const char *const gains[] = {"Pgain", "Igain", "Dgain", "FF2"};
 static int comp_id;
 static hal_quadrant_t *hal;
 static struct Board *board;
@@ -61,7 +63,8 @@ static int has(int axis) { return strchr(joints, axes[axis]) != NULL; }
 
 static void update(void *arg, long period)
 {
-    int n;
+    double asked[3][4];
+    int n, g;
 
     if (ends) return;
     pins.now_ns = rtapi_get_time();
@@ -77,6 +80,7 @@ static void update(void *arg, long period)
         to->rawcounts = *from->rawcounts;
         to->enable = *from->enable;
         to->amp_fault = *from->amp_fault;
+        for (g = 0; g < 4; g++) to->gains[g] = asked[n][g] = *from->gains[g];
     }
     quadrant_tick(board, &pins);
     *hal->driven = pins.driven;
@@ -84,6 +88,8 @@ static void update(void *arg, long period)
         struct QuadrantJoint *from = &pins.joints[n];
         joint_t *to = &hal->joint[n];
         if (!has(n)) continue;
+        for (g = 0; g < 4; g++)
+            if (from->gains[g] != asked[n][g]) *to->gains[g] = from->gains[g];
         *to->output = from->output;
         *to->ff_level = from->ff_level;
         *to->ff_viscous = from->ff_viscous;
@@ -99,13 +105,15 @@ static void update(void *arg, long period)
 
 static int export_joint(joint_t *j, char axis)
 {
-    int r = 0;
+    int g, r = 0;
     r |= hal_pin_float_newf(HAL_IN, &j->position_cmd, comp_id, "quadrant.%c.position-cmd", axis);
     r |= hal_pin_float_newf(HAL_IN, &j->velocity_cmd, comp_id, "quadrant.%c.velocity-cmd", axis);
     r |= hal_pin_float_newf(HAL_IN, &j->position_fb, comp_id, "quadrant.%c.position-fb", axis);
     r |= hal_pin_s32_newf(HAL_IN, &j->rawcounts, comp_id, "quadrant.%c.rawcounts", axis);
     r |= hal_pin_bit_newf(HAL_IN, &j->enable, comp_id, "quadrant.%c.enable", axis);
     r |= hal_pin_bit_newf(HAL_IN, &j->amp_fault, comp_id, "quadrant.%c.amp-fault", axis);
+    for (g = 0; g < 4; g++)
+        r |= hal_pin_float_newf(HAL_IO, &j->gains[g], comp_id, "quadrant.%c.%s", axis, gains[g]);
     r |= hal_pin_float_newf(HAL_OUT, &j->output, comp_id, "quadrant.%c.output", axis);
     r |= hal_pin_float_newf(HAL_OUT, &j->ff_level, comp_id, "quadrant.%c.ff-level", axis);
     r |= hal_pin_float_newf(HAL_OUT, &j->ff_viscous, comp_id, "quadrant.%c.ff-viscous", axis);

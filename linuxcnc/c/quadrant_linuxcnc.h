@@ -69,6 +69,8 @@ typedef struct QuadrantJoint {
   bool enable;
   // In: the amplifier reports a fault.
   bool amp_fault;
+  // In and out: P, I, D and FF2, V, machine units and s: those in force, or others that are to act.
+  double gains[4];
   // Out: voltage for the amplifier, V.
   double output;
   // Out: friction that is fed forward, V: the level of Coulomb and Stribeck.

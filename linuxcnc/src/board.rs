@@ -13,7 +13,7 @@ use quadrant_law::safety::{AxisSwitches, SafetyState, Switches};
 use quadrant_law::stage::{Inputs, Outputs};
 
 use crate::reference::{CommandPins, CommandReference, Preview};
-use crate::slow::{self, FastEnds, Place, Report, SlowThread};
+use crate::slow::{self, FastEnds, Place, Report, SlowThread, Wish};
 
 /// Number on `fault`: the outputs could not be enabled: no axis is commissioned, the settings are damaged, or an axis moves.
 pub const NOT_ENABLED: i32 = 100;
@@ -45,6 +45,8 @@ pub struct QuadrantJoint {
     pub enable: bool,
     /// In: the amplifier reports a fault.
     pub amp_fault: bool,
+    /// In and out: P, I, D and FF2, V, machine units and s: those in force, or others that are to act.
+    pub gains: [f64; 4],
     /// Out: voltage for the amplifier, V.
     pub output: f64,
     /// Out: friction that is fed forward, V: the level of Coulomb and Stribeck.
@@ -132,6 +134,8 @@ struct Joint {
     reversed: bool,
     reference: CommandReference,
     rawcounts: i32,
+    /// The gains that the pins show.
+    gains: [f64; 4],
     was_enabled: bool,
     hold: Hold,
     /// Scale of the output's words, and what it was made of.
@@ -150,6 +154,8 @@ pub struct Board {
     periods_ns: [i64; 2],
     last_ns: i64,
     frames: u32,
+    /// Gains that the pins have asked for so far; wraps.
+    wishes: u32,
     timing: TimingStatistics,
     /// Ticks in which the outputs are yet to be enabled.
     enabling: u32,
@@ -196,6 +202,7 @@ impl Board {
                     (longest - ticks(index)) as usize,
                 ),
                 rawcounts: 0,
+                gains: [0.0; 4],
                 was_enabled: false,
                 hold: Hold::Released,
                 codes_per_volt: 0.0,
@@ -212,6 +219,7 @@ impl Board {
                 .map(|sign| (period_ns * (1.0 + sign * PERIOD_TOLERANCE)) as i64),
             last_ns: 0,
             frames: 0,
+            wishes: 0,
             timing: TimingStatistics::default(),
             enabling: 0,
             fault: 0,
@@ -234,6 +242,13 @@ impl Board {
             self.frames = answer.frames;
             self.control.show_glitches(answer.glitches);
             inputs.command = answer.command;
+            if answer.wishes == self.wishes {
+                for joint in self.joints.iter_mut().flatten() {
+                    let gains = answer.gains[joint.name as usize];
+                    joint.gains = gains.map(|gain| gain * self.options.unit_mm);
+                    pins.joints[joint.name as usize].gains = joint.gains;
+                }
+            }
         }
         self.control.note_requests(self.frames);
         let outputs = self.control.tick(&mut inputs);
@@ -275,6 +290,17 @@ impl Board {
             if seen.amp_fault {
                 let switches = AxisSwitches::AMPLIFIER_FAULT;
                 inputs.switches = inputs.switches.with_axis(joint.name, switches);
+            }
+            // Bits: no number is the same as itself, too.
+            let asked = seen.gains.map(f64::to_bits) != joint.gains.map(f64::to_bits);
+            if asked && self.ends.wishes.ready() {
+                joint.gains = seen.gains;
+                self.wishes = self.wishes.wrapping_add(1);
+                // There is room: only this side fills it.
+                let _ = self.ends.wishes.enqueue(Wish {
+                    axis: joint.name,
+                    gains: seen.gains.map(|gain| gain * self.mm_to_units),
+                });
             }
             let sign = if joint.reversed { -1 } else { 1 };
             let before = self.control.state().axes()[joint.name].telemetry().measured;

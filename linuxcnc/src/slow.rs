@@ -13,9 +13,10 @@ use quadrant::app::{Control, Poll, Snapshot, TimingStatistics};
 use quadrant_host::machine::FlashFile;
 use quadrant_host::machine::application::{BoardIdentity, SlowHalf, Start, start_halves};
 use quadrant_host::machine::memory_flash::{self, MemoryFlash};
+use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_link::message::NumberType;
-use quadrant_settings::{PlanSettings, StageSettings};
+use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_sim::settings_file::SettingsFile;
 
 use crate::port::Port;
@@ -36,12 +37,25 @@ pub(crate) struct Report {
     pub(crate) timing: TimingStatistics,
 }
 
+/// Gains of an axis that can be set live: P, I and D, and inertia; V, mm and s.
+pub(crate) type Gains = [f64; 4];
+
+/// Gains that the pins ask for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wish {
+    pub(crate) axis: AxisName,
+    pub(crate) gains: Gains,
+}
+
 /// What a run of the slow half leaves for the fast one.
 #[derive(Clone, Debug)]
 pub(crate) struct Answer {
     pub(crate) command: Option<Command>,
     pub(crate) frames: u32,
     pub(crate) glitches: GlitchReadings,
+    /// The gains in force, and the number of wishes that they know of.
+    pub(crate) gains: [Gains; 3],
+    pub(crate) wishes: u32,
 }
 
 /// One report: while it waits, newer ones are dropped, and the next is at most some ticks old.
@@ -49,8 +63,12 @@ pub(crate) type Reports = Queue<Report, 2>;
 /// Answers that may wait for a tick.
 pub(crate) type Answers = Queue<Answer, 8>;
 
+/// Wishes that may wait.
+pub(crate) type Wishes = Queue<Wish, 8>;
+
 /// The fast half's ends of the queues.
 pub(crate) struct FastEnds {
+    pub(crate) wishes: Producer<'static, Wish, 8>,
     pub(crate) reports: Producer<'static, Report, 2>,
     pub(crate) answers: Consumer<'static, Answer, 8>,
     pub(crate) outputs_off: Arc<AtomicBool>,
@@ -114,6 +132,7 @@ pub(crate) fn start(place: &Place<'_>) -> io::Result<Started> {
     let port = Port::listen(place.address)?;
     let (reports, reports_out) = Box::leak(Box::new(Reports::new())).split();
     let (answers_in, answers) = Box::leak(Box::new(Answers::new())).split();
+    let (wishes, wishes_out) = Box::leak(Box::new(Wishes::new())).split();
     let stop = Arc::new(AtomicBool::new(false));
     let outputs_off = Arc::new(AtomicBool::new(true));
     let slow = Slow {
@@ -122,6 +141,8 @@ pub(crate) fn start(place: &Place<'_>) -> io::Result<Started> {
         port,
         reports: reports_out,
         answers: answers_in,
+        wishes: wishes_out,
+        served: 0,
         outputs_off: Arc::clone(&outputs_off),
     };
     let stopped = Arc::clone(&stop);
@@ -132,6 +153,7 @@ pub(crate) fn start(place: &Place<'_>) -> io::Result<Started> {
         control,
         settings,
         ends: FastEnds {
+            wishes,
             reports,
             answers,
             outputs_off,
@@ -141,6 +163,29 @@ pub(crate) fn start(place: &Place<'_>) -> io::Result<Started> {
             thread: Some(thread),
         },
     })
+}
+
+/// The gains of an axis.
+fn gains_of(axis: &AxisSettings) -> Gains {
+    let pid = &axis.feedback.pid;
+    let inertia = axis.feedforward.gains.inertia_v_s2_per_mm;
+    [
+        pid.kp_v_per_mm,
+        pid.ki_v_per_mm_s,
+        pid.kd_v_s_per_mm,
+        inertia,
+    ]
+}
+
+/// Sets the gains of an axis.
+fn set(axis: &mut AxisSettings, gains: Gains) {
+    let pid = &mut axis.feedback.pid;
+    [
+        pid.kp_v_per_mm,
+        pid.ki_v_per_mm_s,
+        pid.kd_v_s_per_mm,
+        axis.feedforward.gains.inertia_v_s2_per_mm,
+    ] = gains;
 }
 
 /// The settings of a machine that nobody has commissioned, at a rate.
@@ -163,6 +208,9 @@ struct Slow {
     port: Port,
     reports: Consumer<'static, Report, 2>,
     answers: Producer<'static, Answer, 8>,
+    wishes: Consumer<'static, Wish, 8>,
+    /// Wishes served so far; wraps.
+    served: u32,
     outputs_off: Arc<AtomicBool>,
 }
 
@@ -180,6 +228,16 @@ impl Slow {
     fn serve(&mut self, report: &Report) {
         let off = self.outputs_off.load(Ordering::Relaxed);
         self.half.flash().set_outputs_off(off);
+        while let Some(wish) = self.wishes.dequeue() {
+            self.served = self.served.wrapping_add(1);
+            if let Err(error) = self
+                .half
+                .server()
+                .change(wish.axis, |axis| set(axis, wish.gains))
+            {
+                eprintln!("quadrant: the gains of {} stay: {error}", wish.axis);
+            }
+        }
         let after = self.half.run(&report.seen, report.timing, &mut self.port);
         if after == Poll::Reboot {
             eprintln!(
@@ -204,7 +262,11 @@ impl Slow {
             if command.is_none() && round > 0 {
                 return;
             }
+            let gains = &self.half.server().acting().axes;
+            let gains = gains.each_ref().map(gains_of);
             let answer = Answer {
+                gains,
+                wishes: self.served,
                 command,
                 frames: self.half.frames(),
                 glitches: self.half.glitch_readings(),

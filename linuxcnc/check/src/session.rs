@@ -24,7 +24,7 @@ const TIMEOUT_S: &str = "100";
 pub(crate) struct Session {
     /// Name of its folder.
     pub(crate) name: String,
-    /// File of the loops: `pid.hal`, `quadrant.hal` or `feedforward.hal`.
+    /// File of the loops in `linuxcnc/configs/sim`.
     pub(crate) loops: &'static str,
     /// Settings of the component.
     pub(crate) settings: StageSettings,

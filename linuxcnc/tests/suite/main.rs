@@ -5,6 +5,7 @@
 mod component;
 mod faults;
 mod forbidding;
+mod gains;
 mod header;
 mod link;
 mod reference;

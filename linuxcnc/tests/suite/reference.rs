@@ -31,14 +31,13 @@ fn led(preview: Preview) -> Vec<Led> {
 
 #[test]
 fn the_feedback_gets_the_command_of_the_period_before_and_the_feedforward_what_will_be() {
-    let led = led(Preview::Extrapolate);
-    for tick in 2..500_usize {
+    for (tick, led) in led(Preview::Extrapolate).iter().enumerate().skip(2) {
         let time_s = tick as f64 / RATE_HZ;
-        let now_mm = led[tick].now.unwrap().to_mm(RESOLUTION_MM);
+        let now_mm = led.now.unwrap().to_mm(RESOLUTION_MM);
         assert!((now_mm - sine_mm(time_s - 1.0 / RATE_HZ)).abs() < 1e-7);
         // The command is known for the end of this period; an output is held for one, half of it on average.
         let ahead_s = time_s + PREVIEW_S - 0.5 / RATE_HZ;
-        let ahead = led[tick].ahead;
+        let ahead = led.ahead;
         assert!((ahead.position.to_mm(RESOLUTION_MM) - sine_mm(ahead_s)).abs() < 1e-6);
         let velocity = 2.0 * TAU * (TAU * ahead_s).cos();
         assert!((f64::from(ahead.velocity) - velocity).abs() < 5e-3 * TAU);

@@ -202,6 +202,11 @@ impl<S: Scalar> SlowHalf<S> {
     pub fn flash(&self) -> &MemoryFlash {
         self.server.flash()
     }
+
+    /// The server of the link.
+    pub fn server(&mut self) -> &mut Server<'static, 'static, S, MemoryFlash> {
+        &mut self.server
+    }
 }
 
 impl<S: Scalar> Running<S> {
