@@ -9,11 +9,12 @@ use crate::app::telemetry::{Observation, Sampler, SamplerState};
 use quadrant_law::axes::{AxisName, PerAxis};
 use quadrant_law::command::Command;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant_law::reference::Motion;
+use quadrant_law::reference::{Motion, ReferenceSample};
 use quadrant_law::safety::{FaultCode, Operation, Station, Switches};
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::{Inputs, Outputs, Plan, StageRef, StageState};
 use quadrant_law::supervisor::PERIOD_TICKS;
+use quadrant_law::units::Position;
 
 /// Everything that the control interrupt owns. What is small comes first.
 #[repr(C)]
@@ -100,6 +101,23 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         self.host.note_requests(frames);
     }
 
+    /// Sets the reference of an axis that a planner of the board's leads, before a tick: where it will be after the axis' preview,
+    /// and where the feedback's is `now`, unless that is what the former was before the preview. The axis follows it from
+    /// [`Command::StartMove`] on.
+    pub fn lead(&mut self, name: AxisName, now: Option<Position>, ahead: ReferenceSample<S>) {
+        self.plan[name] = Motion::Given(ahead);
+        self.moved[name] = false;
+        if let Some(now) = now {
+            let stage = stage_of(&self.axes, &self.operation);
+            stage.place_reference(&mut self.state, name, now);
+        }
+    }
+
+    /// Ends [`lead`](Self::lead): a plan of a host moves the axis again.
+    pub fn release(&mut self, name: AxisName) {
+        self.plan[name] = Motion::Hold;
+    }
+
     /// One control period: takes what the server has sent, and computes the outputs. It adds to the inputs: the settings'
     /// changes are its own to report, and an order of the server's acts when they have no command.
     #[inline(always)]
@@ -136,7 +154,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
 
     /// The stage.
     #[inline(always)]
-    fn stage(&self) -> StageRef<'_, S> {
+    pub fn stage(&self) -> StageRef<'_, S> {
         stage_of(&self.axes, &self.operation)
     }
 

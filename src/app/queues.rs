@@ -79,8 +79,8 @@ const ORDERS: usize = 8;
 const BYTES: usize = 1024;
 /// Size of the queue of a stream's items.
 const STREAM_ITEMS: usize = 16;
-/// Samples of each tick of 3 ms at 10 kHz.
-const SAMPLES: usize = 32;
+/// Samples of each tick of 3 ms at 10 kHz; of 100 ms, where the server's thread waits for an operating system.
+const SAMPLES: usize = if cfg!(target_os = "none") { 32 } else { 1024 };
 
 /// Segments of a stream, or blocks of an injection, that may wait for the control law.
 pub(super) const STREAM_ITEM_ROOM: usize = STREAM_ITEMS - 1;

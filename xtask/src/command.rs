@@ -13,7 +13,10 @@ pub fn root() -> PathBuf {
     // Cargo sets the variable for what it runs; without cargo, the current folder must be the workspace's.
     manifest.map_or_else(here, |folder| {
         let folder = PathBuf::from(folder);
-        folder.parent().map_or(folder.clone(), Path::to_path_buf)
+        let root = folder
+            .ancestors()
+            .find(|above| above.join("Cargo.lock").exists());
+        root.map_or(folder.clone(), Path::to_path_buf)
     })
 }
 

@@ -80,6 +80,8 @@ enum Verb {
     Commission(Forwarded),
     /// Count the instructions of a control tick while link, queues and log are overloaded
     Saturation(Forwarded),
+    /// Build and install the components of LinuxCNC, start it on the simulated stage, and judge its loops and ours
+    Linuxcnc(Forwarded),
     /// Time the host simulation beside the same job in C++, Numba and NumPy
     Peers,
     /// Build the page of the bench, which a browser opens
@@ -100,7 +102,7 @@ enum Verb {
     },
 }
 
-/// Options of the package `target-tests`.
+/// Options of the packages `target-tests` and `linuxcnc/check`.
 #[derive(Args)]
 #[command(disable_help_flag = true)]
 struct Forwarded {
@@ -199,6 +201,7 @@ fn run(cli: Cli) -> Result<bool> {
         Verb::Combinations(args) => forward(toolchain()?, "combinations", args)?,
         Verb::Commission(args) => forward(toolchain()?, "commission", args)?,
         Verb::Saturation(args) => forward(toolchain()?, "saturation", args)?,
+        Verb::Linuxcnc(args) => linuxcnc(args)?,
         Verb::Peers => peers::run()?,
         Verb::Documented(options) => documented::run(&options)?,
         Verb::Figures { overwrite } => figures::run(overwrite)?,
@@ -219,6 +222,22 @@ fn run(cli: Cli) -> Result<bool> {
         } => return test::firmware_only(toolchain()?),
     }
     Ok(true)
+}
+
+/// Runs the package `linuxcnc/check`.
+fn linuxcnc(args: Forwarded) -> Result<()> {
+    let mut cargo = command::command("cargo");
+    cargo
+        .args([
+            "run",
+            "--quiet",
+            "--release",
+            "--package",
+            "quadrant-linuxcnc-check",
+            "--",
+        ])
+        .args(args.options);
+    command::run_quietly(&mut cargo)
 }
 
 /// Runs a verb of the package `target-tests`.

@@ -83,6 +83,9 @@ pub(crate) fn run(choice: Choice) -> Result<bool> {
     report.step("every converter word in a browser", || {
         web::check(&web::build(toolchain)?)
     });
+    report.step("LinuxCNC's loops and ours", || {
+        command::run(command::command("cargo").args(["xtask", "linuxcnc", "--check"]))
+    });
     emulated(&mut report, toolchain)?;
     println!("\n{:.1} min", started.elapsed().as_secs_f64() / 60.0);
     Ok(report.finish())

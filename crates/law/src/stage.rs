@@ -25,6 +25,7 @@ use crate::friction::gms::FIRMWARE_ELEMENTS;
 use crate::injection::{
     Coupling, InjectedValue, Injection, InjectionProgress, InjectionState, InjectionStep,
 };
+use crate::motion::MotionMode;
 use crate::reference::{Motion, Segment};
 use crate::safety::plausibility::is_due;
 use crate::safety::standstill::StandstillState;
@@ -32,7 +33,7 @@ use crate::safety::{
     BrakeState, EnableInterlock, Fault, FaultCode, Operation, Reaction, SafetyState, Switches,
 };
 use crate::scalar::Scalar;
-use crate::units::DacCode;
+use crate::units::{DacCode, Position};
 
 /// Ticks from the end of the stop ramps to switching off: the preview has passed, and the axes have caught up.
 const SETTLING_TICKS: u32 = 200;
@@ -309,6 +310,15 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         injection.is_none_or(|injection| {
             self.axes[injection.axis()].commissioning() == Commissioning::Done
         })
+    }
+
+    /// Puts the feedback's reference of the next tick where a planner of the board's has it, if the axis follows its plan: to be
+    /// called before every tick with [`Motion::Given`].
+    pub fn place_reference(&self, state: &mut StageState<S, N>, name: AxisName, now: Position) {
+        let (axis, memory, tick) = (self.axes[name], &mut state.axes[name], state.tick);
+        if memory.mode() == MotionMode::Plan {
+            axis.place_reference(memory, now, tick);
+        }
     }
 
     /// True if an axis was commissioned, and no other has a law that could drive it.

@@ -6,6 +6,7 @@
 
 use core::fmt;
 
+use super::axis::AxisSettings;
 use super::error::{PathOf, SettingsError};
 use super::leaves::rules::{SAFETY_OF_AN_AXIS, SAFETY_OF_THE_STAGE};
 use super::stage::StageSettings;
@@ -152,6 +153,12 @@ impl<'a> Draft<'a> {
         let axis = self.settings.set_bytes(path, kind, bytes)?;
         self.touch(axis);
         Ok(())
+    }
+
+    /// The settings of an axis, to be edited; it counts as changed.
+    pub fn axis_mut(&mut self, axis: AxisName) -> &mut AxisSettings {
+        self.touch(Some(axis as usize));
+        &mut self.settings.axes[axis as usize]
     }
 
     /// Marks an axis as changed; all of them for a setting of the stage.

@@ -14,7 +14,7 @@ use quadrant_link::message::{
     Value, text,
 };
 use quadrant_settings::draft::ApplyError;
-use quadrant_settings::{MAX_VALUE_BYTES, StageSettings};
+use quadrant_settings::{AxisSettings, MAX_VALUE_BYTES, StageSettings};
 
 impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     /// The memory for settings.
@@ -25,6 +25,31 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     /// The origin of the stored settings.
     pub const fn provenance(&self) -> &Provenance {
         &self.provenance
+    }
+
+    /// The settings in force.
+    pub fn acting(&self) -> &StageSettings {
+        self.draft.in_force()
+    }
+
+    /// Changes settings of an axis as the board's own controls ask, and lets them act.
+    ///
+    /// # Errors
+    /// As a host's `Apply`, or while a host edits settings; nothing has changed then.
+    pub fn change(
+        &mut self,
+        axis: AxisName,
+        edit: impl FnOnce(&mut AxisSettings),
+    ) -> Result<(), LinkError> {
+        if self.draft.is_edited() {
+            return Err(busy(format_args!("a host edits the settings")));
+        }
+        edit(self.draft.axis_mut(axis));
+        let applied = self.apply();
+        if applied.is_err() {
+            self.draft.revert();
+        }
+        applied.map(|_| ())
     }
 
     /// Counts the paths of the draft. Visits them all: for rare occasions.

@@ -7,7 +7,7 @@ use quadrant_written::whole;
 
 /// A file that keeps a flash's content: every byte as the flash reads, 0xFF where it is erased.
 #[derive(Clone, Debug)]
-pub(super) struct FlashFile {
+pub struct FlashFile {
     path: PathBuf,
     kept: Vec<u8>,
 }
@@ -17,7 +17,7 @@ impl FlashFile {
     ///
     /// # Errors
     /// A file that cannot be read or written, or of another size.
-    pub(super) fn open(path: &Path, bytes: usize) -> io::Result<Self> {
+    pub fn open(path: &Path, bytes: usize) -> io::Result<Self> {
         let kept = match std::fs::read(path) {
             Ok(kept) => kept,
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
@@ -46,7 +46,7 @@ impl FlashFile {
     }
 
     /// Returns the content that it keeps.
-    pub(super) fn content(&self) -> &[u8] {
+    pub fn content(&self) -> &[u8] {
         &self.kept
     }
 
@@ -54,7 +54,7 @@ impl FlashFile {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub(super) fn keep(&mut self, content: &[u8]) -> io::Result<()> {
+    pub fn keep(&mut self, content: &[u8]) -> io::Result<()> {
         if self.kept == content {
             return Ok(());
         }

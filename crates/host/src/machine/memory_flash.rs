@@ -11,7 +11,7 @@ use quadrant::hal::SettingsFlash;
 /// Size of a sector, as on the reference board.
 const SECTOR_BYTES: usize = 16 * 1024;
 /// Size of both sectors together.
-pub(super) const BYTES: usize = 2 * SECTOR_BYTES;
+pub const BYTES: usize = 2 * SECTOR_BYTES;
 
 /// Two sectors of 16 KiB.
 #[derive(Clone, Debug)]

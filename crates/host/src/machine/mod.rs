@@ -48,6 +48,7 @@ mod transport;
 
 #[cfg(all(unix, feature = "emulated"))]
 pub use emulated_link::EmulatedLink;
+pub use flash_file::FlashFile;
 pub use interface::Machine;
 pub use journal::{Begun, Journal};
 pub use law_stage::LawStage;

@@ -158,6 +158,11 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         self.commissioning
     }
 
+    /// Converter codes per volt; negative where the output is reversed.
+    pub const fn codes_per_volt(&self) -> S::Gain {
+        self.amplifier.codes_per_volt
+    }
+
     /// One control period of an axis that is driven by itself, without a stage: reads the encoder, advances the
     /// reference, computes the output.
     ///
@@ -493,6 +498,13 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             // The stage's own.
             Command::StartInjection | Command::Enable | Command::Disable | Command::ResetFault => {}
         }
+    }
+
+    /// Puts the feedback's reference of tick `tick` where a planner has it, in the place of what the feedforward's was after the
+    /// preview: an extrapolated reference does not pass its error on.
+    pub(crate) fn place_reference(&self, state: &mut AxisState<S, N>, now: Position, tick: u32) {
+        let delayed = (tick as usize).wrapping_sub(self.preview_ticks) % PREVIEW_ROOM;
+        state.preview[delayed] = now;
     }
 
     /// Begins a controlled stop, unless one is under way.

@@ -69,6 +69,8 @@ pub enum Motion<S: Scalar> {
     PointToPoint(PointToPoint<S>),
     /// A recorded table of positions, relative to its first.
     Recorded(RecordedTable<S>),
+    /// A reference from elsewhere, at an absolute position: it is exchanged before every tick.
+    Given(ReferenceSample<S>),
 }
 
 impl<S: Scalar> Motion<S> {
@@ -91,6 +93,7 @@ impl<S: Scalar> Motion<S> {
             Self::Harmonic(harmonic) => harmonic.step(state),
             Self::PointToPoint(to_point) => to_point.step(state),
             Self::Recorded(table) => table.step(state),
+            Self::Given(sample) => return *sample,
         };
         state.elapsed = state.elapsed.saturating_add(1);
         ReferenceSample {
@@ -103,6 +106,7 @@ impl<S: Scalar> Motion<S> {
     pub fn ends(&self) -> bool {
         match self {
             Self::Harmonic(harmonic) => harmonic.ends(),
+            Self::Given(_) => false,
             Self::Hold | Self::PointToPoint(_) | Self::Recorded(_) => true,
         }
     }
@@ -115,6 +119,7 @@ impl<S: Scalar> Motion<S> {
             Self::Harmonic(harmonic) => harmonic.finished(state),
             Self::PointToPoint(to_point) => to_point.finished(state),
             Self::Recorded(table) => table.finished(state),
+            Self::Given(_) => false,
         }
     }
 }

@@ -1,0 +1,168 @@
+//! A LinuxCNC without a screen that runs the part program on the simulated stage.
+//!
+//! LinuxCNC does not run as root: a user is made for it. Each session has network, shared memory and temporary files of its own, so that
+//! several run at a time; the machine's time is counted in periods, so that they do not disturb one another.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use anyhow::{Context, Result, ensure};
+use quadrant_settings::StageSettings;
+use quadrant_sim::settings_file::SettingsFile;
+use xtask::command;
+
+use crate::install::sources;
+
+/// The user that LinuxCNC runs as.
+const USER: &str = "quadrant";
+/// Seconds that a session may take.
+const TIMEOUT_S: &str = "100";
+
+/// A session.
+#[derive(Clone, Debug)]
+pub(crate) struct Session {
+    /// Name of its folder.
+    pub(crate) name: String,
+    /// File of the loops in `linuxcnc/configs/sim`.
+    pub(crate) loops: &'static str,
+    /// Settings of the component.
+    pub(crate) settings: StageSettings,
+    /// P, I, D, FF1 and FF2 of LinuxCNC's loops.
+    pub(crate) gains: [[f64; 5]; 3],
+    /// `extrapolate` or `delay`.
+    pub(crate) preview: &'static str,
+    /// Seed of the stage's noise.
+    pub(crate) seed: u32,
+}
+
+/// Makes the user, unless there is one.
+pub(crate) fn make_user() -> Result<()> {
+    if Path::new("/home").join(USER).exists() {
+        return Ok(());
+    }
+    command::run(command::command("useradd").args(["--create-home", USER]))
+}
+
+/// Writes a session's files to a folder; `display`: the program that shows them.
+pub(crate) fn write(session: &Session, folder: &Path, display: &str) -> Result<()> {
+    fs::create_dir_all(folder)?;
+    let configs = sources().join("configs/sim");
+    for entry in configs.read_dir()? {
+        let path = entry?.path();
+        fs::copy(&path, folder.join(path.file_name().context("a file")?))?;
+    }
+    let rate = session.settings.rate_hz.to_string();
+    let period = (1e9 / session.settings.rate_hz).to_string();
+    let seed = session.seed.to_string();
+    let mut values = vec![
+        ("DISPLAY", "DISPLAY", display.to_owned()),
+        ("EMCMOT", "SERVO_PERIOD", period),
+        ("QUADRANT", "PREVIEW", session.preview.to_owned()),
+        ("PLANT", "RATE", rate),
+        ("PLANT", "SEED", seed),
+        (
+            "PLANT",
+            "RECORD",
+            folder.join("record").display().to_string(),
+        ),
+        (
+            "QUADRANT",
+            "DEFAULTS",
+            folder.join("settings.toml").display().to_string(),
+        ),
+        (
+            "QUADRANT",
+            "STORE",
+            folder.join("settings.store").display().to_string(),
+        ),
+        (
+            "DISPLAY",
+            "OPEN_FILE",
+            folder.join("part.ngc").display().to_string(),
+        ),
+    ];
+    for (joint, gains) in ["JOINT_0", "JOINT_1", "JOINT_2"].iter().zip(session.gains) {
+        for (name, gain) in ["P", "I", "D", "FF1", "FF2"].into_iter().zip(gains) {
+            values.push((joint, name, format!("{gain:.9}")));
+        }
+    }
+    let text = fs::read_to_string(configs.join("machine.ini"))?;
+    let text = with_values(&text, &values)?.replace(
+        "HALFILE = quadrant.hal",
+        &format!("HALFILE = {}", session.loops),
+    );
+    fs::write(folder.join("machine.ini"), text)?;
+    let path = folder.join("settings.toml");
+    let settings = SettingsFile::new(session.settings.clone());
+    fs::write(&path, settings.text(&path).map_err(anyhow::Error::from)?)?;
+    Ok(())
+}
+
+/// The text of an INI file with other values.
+fn with_values(text: &str, values: &[(&str, &str, String)]) -> Result<String> {
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    for (section, name, value) in values {
+        let header = format!("[{section}]");
+        let begin = lines.iter().position(|line| *line == header);
+        let begin = begin.with_context(|| format!("machine.ini has no {header}"))?;
+        let line = lines[begin..]
+            .iter()
+            .position(|line| line.split_once(" = ").is_some_and(|(key, _)| key == *name))
+            .with_context(|| format!("{header} has no {name}"))?;
+        lines[begin + line] = format!("{name} = {value}");
+    }
+    Ok(lines.join("\n") + "\n")
+}
+
+/// A session that runs.
+pub(crate) struct Running {
+    child: Child,
+    folder: PathBuf,
+    name: String,
+}
+
+/// Starts a session in a folder below `folder`.
+pub(crate) fn start(session: &Session, folder: &Path) -> Result<Running> {
+    let folder = folder.join(&session.name);
+    let display = folder.join("headless.py");
+    write(session, &folder, &display.display().to_string())?;
+    command::run_quietly(command::command("chown").args(["-R", USER]).arg(&folder))?;
+    // Temporary files and the control's lock lie below /tmp, shared memory and ports in their own spaces.
+    let script = format!(
+        "ip link set lo up; mount -t proc proc /proc; mkdir -p {0}/tmp && chown {USER} {0}/tmp && mount --bind {0}/tmp /tmp; \
+         cd {0} && exec runuser -u {USER} -- env HOME={0} DISPLAY= timeout {TIMEOUT_S} linuxcnc -r {0}/machine.ini",
+        folder.display()
+    );
+    let log = fs::File::create(folder.join("log"))?;
+    let child = Command::new("unshare")
+        .args([
+            "--ipc", "--net", "--mount", "--pid", "--fork", "sh", "-c", &script,
+        ])
+        .stdin(Stdio::null())
+        .stdout(log.try_clone()?)
+        .stderr(log)
+        .spawn()
+        .context("unshare")?;
+    Ok(Running {
+        child,
+        folder,
+        name: session.name.clone(),
+    })
+}
+
+impl Running {
+    /// Waits for its end; returns the folder with its record.
+    pub(crate) fn finish(mut self) -> Result<PathBuf> {
+        let status = self.child.wait()?;
+        let text = |name| fs::read_to_string(self.folder.join(name)).unwrap_or_default();
+        let result = text("result");
+        ensure!(
+            result.trim() == "done" && self.folder.join("record").exists(),
+            "{}: {status}: {result}{}",
+            self.name,
+            text("log")
+        );
+        Ok(self.folder)
+    }
+}

@@ -1,0 +1,48 @@
+//! Gains on the pins.
+
+use std::thread;
+use std::time::Duration;
+
+use crate::component::{Component, Parameters, settings};
+
+/// Ticks at about the pace of a thread, until something is so.
+fn until(component: &mut Component, is_so: impl Fn(&Component) -> bool) {
+    for _ in 0..2_000 {
+        component.step(true);
+        if is_so(component) {
+            return;
+        }
+        thread::sleep(Duration::from_micros(200));
+    }
+    panic!("{:?}", component.pins.joints[0].gains);
+}
+
+#[test]
+fn gains_on_the_pins_are_those_in_force_and_others_act_without_a_jump() {
+    let mut component = Component::start(&Parameters::default());
+    component.run(20, false);
+    let kp = settings().axes[0].feedback.pid.kp_v_per_mm;
+    until(&mut component, |component| {
+        component.pins.joints[0].gains[0] == kp
+    });
+    let before = component.outputs()[0];
+    component.pins.joints[0].gains[0] = 0.5 * kp;
+    for _ in 0..200 {
+        component.step(true);
+        thread::sleep(Duration::from_micros(200));
+    }
+    assert_eq!(component.pins.joints[0].gains[0], 0.5 * kp);
+    assert!((component.outputs()[0] - before).abs() < 0.3);
+    assert!(!component.pins.joints[0].faulted);
+    // What validation refuses comes back.
+    component.pins.joints[0].gains[0] = -1.0;
+    component.step(true);
+    until(&mut component, |component| {
+        component.pins.joints[0].gains[0] == 0.5 * kp
+    });
+    component.pins.joints[0].gains[0] = f64::NAN;
+    component.step(true);
+    until(&mut component, |component| {
+        component.pins.joints[0].gains[0] == 0.5 * kp
+    });
+}

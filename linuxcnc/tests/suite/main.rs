@@ -1,0 +1,12 @@
+//! Tests of the components by the functions that their C calls.
+// They take pointers.
+#![allow(unsafe_code)]
+
+mod component;
+mod faults;
+mod forbidding;
+mod gains;
+mod header;
+mod link;
+mod reference;
+mod words;
