@@ -134,6 +134,9 @@ int rtapi_app_main(void)
     };
     int n, r;
 
+    /* The module may have stayed in memory since it was unloaded. */
+    ends = 0;
+    memset(&pins, 0, sizeof(pins));
     comp_id = hal_init("quadrant");
     if (comp_id < 0) return comp_id;
     board = quadrant_start(&config);

@@ -1,6 +1,7 @@
 /* The realtime component `quadrant_plant`: the simulated stage, volts in, counts out. */
 #include "rtapi.h"
 #include "rtapi_app.h"
+#include "rtapi_string.h"
 #include "hal.h"
 #include "quadrant_linuxcnc.h"
 
@@ -68,6 +69,8 @@ int rtapi_app_main(void)
     };
     int n, r;
 
+    /* The module may have stayed in memory since it was unloaded. */
+    memset(&pins, 0, sizeof(pins));
     comp_id = hal_init("quadrant_plant");
     if (comp_id < 0) return comp_id;
     plant = quadrant_plant_start(&config);

@@ -372,6 +372,11 @@ impl Board {
         if fell || any && (self.fault != 0 || matches!(safety, SafetyState::Stopping(_))) {
             return safety.drives().then_some(Command::Disable);
         }
+        // A host had the axes: what it moves ends here.
+        let mut joints = self.joints.iter().flatten();
+        if rose && safety.drives() && !joints.any(|joint| joint.hold == Hold::Leads) {
+            return Some(Command::Disable);
+        }
         if self.enabling > 0 {
             self.enabling -= 1;
             match safety {

@@ -179,6 +179,12 @@ fn check(folder: &Path, with_delay: bool, again: bool) -> Result<()> {
         }
         return report(loops, &scores);
     }
+    if let Some(session) = sessions.first() {
+        session::start_faults(session, folder)?.finish()?;
+        println!(
+            "unloaded while it drove, loaded again, an encoder stopped: the voltages were zero"
+        );
+    }
     for wave in sessions.chunks(AT_A_TIME) {
         let running: Vec<_> = wave
             .iter()

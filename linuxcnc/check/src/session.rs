@@ -16,8 +16,6 @@ use crate::install::sources;
 
 /// The user that LinuxCNC runs as.
 const USER: &str = "quadrant";
-/// Seconds that a session may take.
-const TIMEOUT_S: &str = "100";
 
 /// A session.
 #[derive(Clone, Debug)]
@@ -119,19 +117,34 @@ fn with_values(text: &str, values: &[(&str, &str, String)]) -> Result<String> {
 pub(crate) struct Running {
     child: Child,
     folder: PathBuf,
-    name: String,
 }
 
 /// Starts a session in a folder below `folder`.
 pub(crate) fn start(session: &Session, folder: &Path) -> Result<Running> {
     let folder = folder.join(&session.name);
-    let display = folder.join("headless.py");
-    write(session, &folder, &display.display().to_string())?;
+    let display = folder.join("headless.py").display().to_string();
+    write(session, &folder, &display)?;
+    // -r: what is printed goes to the log.
+    spawn(folder, "timeout 100 linuxcnc -r $PWD/machine.ini")
+}
+
+/// Starts the component without LinuxCNC: it is unloaded while it drives, and loses an encoder.
+pub(crate) fn start_faults(session: &Session, folder: &Path) -> Result<Running> {
+    let folder = folder.join("faults");
+    write(session, &folder, "")?;
+    for name in ["faults.hal", "faults.sh"] {
+        fs::copy(sources().join("check").join(name), folder.join(name))?;
+    }
+    spawn(folder, "timeout 100 halrun -f faults.hal")
+}
+
+/// Runs a command in a folder as the user. Temporary files and the control's lock lie below /tmp, shared memory and ports in spaces of
+/// their own.
+fn spawn(folder: PathBuf, line: &str) -> Result<Running> {
     command::run_quietly(command::command("chown").args(["-R", USER]).arg(&folder))?;
-    // Temporary files and the control's lock lie below /tmp, shared memory and ports in their own spaces.
     let script = format!(
-        "ip link set lo up; mount -t proc proc /proc; mkdir -p {0}/tmp && chown {USER} {0}/tmp && mount --bind {0}/tmp /tmp; \
-         cd {0} && exec runuser -u {USER} -- env HOME={0} DISPLAY= timeout {TIMEOUT_S} linuxcnc -r {0}/machine.ini",
+        "ip link set lo up; mount -t proc proc /proc; cd {0} && mkdir -p tmp && chown {USER} tmp && mount --bind tmp /tmp && \
+         exec runuser -u {USER} -- env HOME={0} DISPLAY= sh -c 'exec {line}'",
         folder.display()
     );
     let log = fs::File::create(folder.join("log"))?;
@@ -144,23 +157,19 @@ pub(crate) fn start(session: &Session, folder: &Path) -> Result<Running> {
         .stderr(log)
         .spawn()
         .context("unshare")?;
-    Ok(Running {
-        child,
-        folder,
-        name: session.name.clone(),
-    })
+    Ok(Running { child, folder })
 }
 
 impl Running {
-    /// Waits for its end; returns the folder with its record.
+    /// Waits for its end; returns its folder.
     pub(crate) fn finish(mut self) -> Result<PathBuf> {
         let status = self.child.wait()?;
         let text = |name| fs::read_to_string(self.folder.join(name)).unwrap_or_default();
         let result = text("result");
         ensure!(
-            result.trim() == "done" && self.folder.join("record").exists(),
+            result.trim() == "done",
             "{}: {status}: {result}{}",
-            self.name,
+            self.folder.display(),
             text("log")
         );
         Ok(self.folder)

@@ -4,47 +4,110 @@ use std::io::Write;
 use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
+use std::sync::mpsc;
+use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use quadrant_host::client::Client;
 use quadrant_host::machine::TcpTransport;
+use quadrant_link::message::{AxisMode, AxisName, Body};
 
 use crate::component::{Component, Parameters};
 
 /// A port that is free.
 fn free_port() -> u16 {
-    TcpListener::bind("127.0.0.1:0")
-        .unwrap()
-        .local_addr()
-        .unwrap()
-        .port()
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    listener.local_addr().unwrap().port()
 }
+
+/// A component that ticks in a thread of its own, and its host.
+struct Ticking {
+    ends: Arc<AtomicBool>,
+    /// LinuxCNC's machine is on.
+    on: Arc<AtomicBool>,
+    thread: JoinHandle<Component>,
+    client: Client,
+}
+
+impl Ticking {
+    fn start() -> Self {
+        let port = free_port();
+        let [ends, on] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+        let (ended, enable) = (Arc::clone(&ends), Arc::clone(&on));
+        let (ready, is_ready) = mpsc::channel();
+        let thread = thread::spawn(move || {
+            let mut component = Component::start(&Parameters {
+                port: port.into(),
+                ..Parameters::default()
+            });
+            ready.send(()).unwrap();
+            while !ended.load(Ordering::Relaxed) {
+                component.step(enable.load(Ordering::Relaxed));
+                thread::sleep(Duration::from_micros(200));
+            }
+            component
+        });
+        is_ready.recv().unwrap();
+        let transport = TcpTransport::connect(&format!("127.0.0.1:{port}")).unwrap();
+        let client = Client::open(transport).unwrap();
+        Self {
+            ends,
+            on,
+            thread,
+            client,
+        }
+    }
+
+    /// Ends the ticks; returns the component as they left it.
+    fn end(self) -> Component {
+        self.ends.store(true, Ordering::Relaxed);
+        self.thread.join().unwrap()
+    }
+}
+
+// SAFETY: its pointers are used by one thread at a time.
+unsafe impl Send for Component {}
 
 #[test]
 fn a_host_talks_to_the_component_while_it_ticks() {
-    let port = free_port();
-    let ends = Arc::new(AtomicBool::new(false));
-    let ended = Arc::clone(&ends);
-    let (ready, is_ready) = std::sync::mpsc::channel();
-    let ticking = thread::spawn(move || {
-        let mut component = Component::start(&Parameters {
-            port: port.into(),
-            ..Parameters::default()
-        });
-        ready.send(()).unwrap();
-        while !ended.load(Ordering::Relaxed) {
-            component.step(false);
-            thread::sleep(Duration::from_micros(200));
-        }
-    });
-    is_ready.recv().unwrap();
-    let transport = TcpTransport::connect(&format!("127.0.0.1:{port}")).unwrap();
-    let client = Client::open(transport).unwrap();
-    let identity = format!("{:?}", client.identity());
-    assert!(identity.contains("linuxcnc"), "{identity}");
-    ends.store(true, Ordering::Relaxed);
-    ticking.join().unwrap();
+    let ticking = Ticking::start();
+    assert_eq!(ticking.client.identity().board.as_str(), "linuxcnc");
+    ticking.end();
+}
+
+#[test]
+fn a_machine_that_is_switched_on_takes_a_joint_from_the_host_that_moves_it() {
+    let mut ticking = Ticking::start();
+    ticking.client.order(Body::Enable).unwrap();
+    let jog = Body::Jog {
+        axis: AxisName::X,
+        velocity_mm_s: 1.0,
+    };
+    ticking.client.order(jog).unwrap();
+    assert_eq!(ticking.client.status().unwrap().axes[0].mode, AxisMode::Jog);
+    ticking.on.store(true, Ordering::Relaxed);
+    thread::sleep(Duration::from_millis(200));
+    let status = ticking.client.status().unwrap();
+    for axis in &status.axes {
+        assert_eq!(axis.mode, AxisMode::Plan);
+    }
+    let component = ticking.end();
+    assert!(component.pins.driven && !component.pins.joints[0].faulted);
+}
+
+#[test]
+fn a_host_that_stops_a_joint_that_linuxcnc_leads_switches_it_off_and_shows_it() {
+    let mut ticking = Ticking::start();
+    ticking.on.store(true, Ordering::Relaxed);
+    thread::sleep(Duration::from_millis(200));
+    ticking.client.order(Body::Stop).unwrap();
+    thread::sleep(Duration::from_millis(200));
+    let component = ticking.end();
+    assert_eq!(component.outputs(), [0.0; 3]);
+    assert_eq!(
+        component.pins.joints[0].fault,
+        quadrant_linuxcnc::board::ENDED
+    );
 }
 
 #[test]
