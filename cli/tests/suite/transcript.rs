@@ -80,6 +80,9 @@ fn number(lines: &[&str], words: &str, before: &str) -> f64 {
 /// the next, so that its largest step is two, three or four counts by chance; the mean moves by a few millivolts.
 const MEAN_TICKS: usize = 20;
 
+/// Largest step of the mean at a change over the largest without one: both are of some thirty ticks of noise.
+const MORE_BY_CHANCE: f64 = 1.5;
+
 /// Step of the output at a tick, and of its mean from the ticks before it to those from it on.
 fn steps_at(output_v: &[f64], tick: usize) -> Option<[f64; 2]> {
     let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
@@ -117,7 +120,7 @@ fn check(played: &Played) {
     let moved = (at - 1..=at + 1).filter_map(|tick| steps_at(&change, tick));
     let moved = moved.fold([0.0; 2], larger);
     assert!(
-        moved[0] <= usual[0] && moved[1] <= usual[1],
+        moved[0] <= usual[0] && moved[1] <= MORE_BY_CHANCE * usual[1],
         "at the change {moved:?} V, otherwise {usual:?} V"
     );
     assert!(usual[1] < 0.02, "{usual:?}: a lost integral term is 0.13 V");
