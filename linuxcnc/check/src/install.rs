@@ -17,11 +17,12 @@ const MANUALS: &str = "/usr/local/share/man/man9";
 /// The manual page.
 const MANUAL: &str = "quadrant.9";
 /// Debian's packages, by a file of each.
-const PACKAGES: [(&str, &str); 4] = [
+const PACKAGES: [(&str, &str); 5] = [
     ("/usr/bin/linuxcnc", "linuxcnc-uspace"),
     ("/usr/include/linuxcnc/hal.h", "linuxcnc-uspace-dev"),
     ("/usr/bin/gcc", "gcc"),
     ("/usr/bin/objcopy", "binutils"),
+    ("/bin/ip", "iproute2"),
 ];
 
 /// Folder of this package's sources.

@@ -36,6 +36,11 @@ pub(crate) struct Session {
 
 /// Makes the user, unless there is one.
 pub(crate) fn make_user() -> Result<()> {
+    let user = command::output(command::command("id").arg("-u"))?;
+    ensure!(
+        user.trim() == "0",
+        "the check makes a user and spaces for each session: run it as root"
+    );
     if Path::new("/home").join(USER).exists() {
         return Ok(());
     }
