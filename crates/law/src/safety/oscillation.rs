@@ -276,8 +276,9 @@ impl<S: Scalar> Oscillation<S> {
     pub fn feeding_from(mut self, counts_per_tick: f64) -> Self {
         let slow = rounding::round(counts_per_tick * ONE_COUNT).min(f64::from(u32::MAX / 2));
         self.slow = slow as u32;
+        // Rounded up: what is left at no speed is nothing.
         self.steps_per_speed =
-            rounding::round(f64::from(REDUCTION_STEPS) * STEPS_SCALE / slow.max(1.0))
+            rounding::ceil(f64::from(REDUCTION_STEPS) * STEPS_SCALE / slow.max(1.0))
                 .min(f64::from(u32::MAX)) as u32;
         self
     }

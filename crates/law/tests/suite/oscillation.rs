@@ -511,3 +511,22 @@ fn an_axis_whose_settings_say_nothing_of_slow_motions_feeds_friction_forward_on_
     shown.strokes(3, 80, 10);
     assert_eq!(shown.acts(), 1.0);
 }
+
+#[test]
+fn nothing_of_the_friction_is_fed_forward_on_slow_motions_whatever_the_speed_in_the_settings() {
+    for thousandths in [1, 7, 40, 80, 160, 320, 400, 3000, 17_000] {
+        let mut shown = Shown {
+            monitor: Oscillation::new(true, 1e6, 1e-4)
+                .feeding_from(f64::from(thousandths) / 1000.0),
+            state: OscillationState::default(),
+            forth: false,
+            speed: counts(thousandths) / 2,
+        };
+        shown.strokes(2, 80, 10);
+        assert_eq!(
+            shown.acts(),
+            0.0,
+            "{thousandths} thousandths of a count a tick"
+        );
+    }
+}
