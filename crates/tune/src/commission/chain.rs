@@ -10,7 +10,7 @@ use super::linear_model::{HOME_MM, Linear, linear_model};
 use super::models::{self, Measurements, Models};
 use super::quiet_pid;
 use super::rest::Knock;
-use super::verify::{Verification, verify};
+use super::verify::{Verification, VerifyError, verify};
 use crate::identify::motor_constant::{self, MotorConstantSettings};
 use crate::identify::static_friction::{
     self, FrictionFit, FrictionFitError, FrictionMap, StaticFrictionError, StaticFrictionSettings,
@@ -106,10 +106,6 @@ fn guarded(
         friction_v: 0.5 * (motor.directed_v[0] + motor.directed_v[1]),
         noise_mm: motor.noise_mm(),
     };
-    quiet_pid::soften(test_axis, &settings, &mut controller, |axis, settings| {
-        let seen = knock.ringing(axis, settings)?;
-        Ok(seen.filter(|(_, is_loud)| *is_loud).map(|(hum, _)| hum))
-    })?;
     let mut tried = false;
     let (map, recordings, friction) = loop {
         controller.put_into(&mut settings);
@@ -124,15 +120,7 @@ fn guarded(
         })?;
         let uneven = map.runs.iter().filter(|run| run.stick_slip).count();
         let is_even = found.is_ok() && (uneven as f64) < MAX_UNEVEN_SHARE * map.runs.len() as f64;
-        if tried
-            || is_even
-            || !quiet_pid::soften(
-                test_axis,
-                &settings,
-                &mut controller,
-                quiet_pid::on_slow_sine,
-            )?
-        {
+        if tried || is_even || !quiet_pid::soften(test_axis, &settings, &mut controller)? {
             break (map, recordings, found?);
         }
         tried = true;
@@ -168,6 +156,14 @@ fn guarded(
     step += 1;
     let mut softenings = 0;
     let verification = loop {
+        let pid = measuring_settings(&found.settings);
+        if let Some((hum, true)) = knock.ringing(test_axis, &pid)?
+            && softenings < models::MAX_SOFTENINGS
+        {
+            softenings += 1;
+            found.soften(&VerifyError::Hums(hum), rate_hz);
+            continue;
+        }
         match verify(test_axis, &found.settings, &mut |share| {
             report(watch, step, share)
         }) {

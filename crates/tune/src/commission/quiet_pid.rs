@@ -1,4 +1,4 @@
-//! A softer PID where the designed one oscillates at rest, or on a slow sine where the friction that was measured under it is uneven.
+//! The PID alone on a slow sine, where the friction that was measured under it is uneven.
 //!
 //! While friction holds the axis, it is not the one that the PID was designed on: its springs resonate, and the motor does against a
 //! table that stands still. A PID that oscillates there makes the axis break away, and the friction that is measured or fed forward is not
@@ -21,7 +21,7 @@ fn slow_sine(info: &AxisInfo) -> SineTest {
     sines[0]
 }
 
-/// Softens the controller in `settings` until no oscillation is seen under the PID alone; true if that made it another one. One that still
+/// Softens the controller in `settings` until it does not oscillate on a slow sine; true if that made it another one. One that still
 /// oscillates after the last of them stays as it was: the trials judge it.
 ///
 /// # Errors
@@ -30,14 +30,13 @@ pub(super) fn soften(
     test_axis: &mut dyn TestAxis,
     settings: &AxisSettings,
     controller: &mut Controller,
-    oscillation: impl Fn(&mut dyn TestAxis, &AxisSettings) -> Result<Option<Ringing>, MachineError>,
 ) -> Result<bool, MachineError> {
     let mut settings = settings.clone();
     let mut softer = controller.clone();
     let mut first = None;
     for softenings in 0..MAX_SOFTENINGS {
         softer.put_into(&mut settings);
-        let Some(ringing) = oscillation(test_axis, &measuring_settings(&settings))? else {
+        let Some(ringing) = oscillation(test_axis, &settings)? else {
             if let Some(ringing) = first {
                 softer.note_softening(&ringing, softenings);
                 *controller = softer;
@@ -50,14 +49,14 @@ pub(super) fn soften(
     Ok(false)
 }
 
-/// The oscillation of settings on the slow sine, if it lasts; none of one that is stopped: what comes next will be, too.
-pub(super) fn on_slow_sine(
+/// The oscillation of the PID alone on the slow sine, if it lasts; none of one that is stopped: what comes next will be, too.
+fn oscillation(
     test_axis: &mut dyn TestAxis,
     settings: &AxisSettings,
 ) -> Result<Option<Ringing>, MachineError> {
     let info = test_axis.info();
     let sine = slow_sine(&info);
-    test_axis.apply(settings)?;
+    test_axis.apply(&measuring_settings(settings))?;
     let run =
         approach(test_axis, HOME_MM).and_then(|()| run_sine(test_axis, "PID", sine, &mut |_| {}));
     Ok(run.ok().and_then(|(_, recording)| {

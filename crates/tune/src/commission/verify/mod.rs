@@ -86,6 +86,13 @@ pub enum VerifyError {
         1e3 * .0.amplitude_mm
     )]
     Rings(Ringing),
+    /// The PID alone hums at rest.
+    #[error(
+        "at rest the PID hums at {:.0} Hz ({:.1} um) after a knock",
+        .0.frequency_hz,
+        1e3 * .0.amplitude_mm
+    )]
+    Hums(Ringing),
 }
 
 impl VerifyError {
@@ -94,7 +101,7 @@ impl VerifyError {
         match self {
             Self::Machine(_) => false,
             Self::TestAxis(error) => error.strayed(),
-            Self::Rings(_) => true,
+            Self::Rings(_) | Self::Hums(_) => true,
         }
     }
 }
