@@ -77,7 +77,12 @@ impl Knock {
         test_axis: &mut dyn TestAxis,
         settings: &AxisSettings,
     ) -> Result<Result<Rest, ExperimentError>, MachineError> {
-        test_axis.apply(settings)?;
+        // A knock is motion that no output has caused, to a monitor that holds the encoder against the plant.
+        let mut settings = settings.clone();
+        settings.plant = None;
+        settings.feedforward.learning = None;
+        settings.feedforward.cancelling = None;
+        test_axis.apply(&settings)?;
         Ok(approach(test_axis, HOME_MM).and_then(|()| self.knocked(test_axis)))
     }
 
