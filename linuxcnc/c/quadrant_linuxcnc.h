@@ -39,7 +39,7 @@ typedef struct QuadrantConfig {
   const char *joints;
   // Machine units: `mm` or `inch`.
   const char *units;
-  // Where counts come from: `rawcounts` or `position`.
+  // Source of the counts: `rawcounts` or `position`.
   const char *feedback;
   // `full`, or `feedforward` for the feedforward alone.
   const char *mode;

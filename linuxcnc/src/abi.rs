@@ -26,7 +26,7 @@ pub struct QuadrantConfig {
     pub joints: *const c_char,
     /// Machine units: `mm` or `inch`.
     pub units: *const c_char,
-    /// Where counts come from: `rawcounts` or `position`.
+    /// Source of the counts: `rawcounts` or `position`.
     pub feedback: *const c_char,
     /// `full`, or `feedforward` for the feedforward alone.
     pub mode: *const c_char,

@@ -51,7 +51,7 @@ pub struct CommandReference {
 /// The reference of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Led {
-    /// Where the feedback's reference is now; none where the law delays it by itself.
+    /// Position of the feedback's reference now; none where the law delays it by itself.
     pub now: Option<Position>,
     /// The reference after the preview.
     pub ahead: ReferenceSample<f32>,

@@ -30,7 +30,7 @@ const IDENTITY: BoardIdentity = BoardIdentity {
     number: NumberType::F32,
 };
 
-/// What the fast half reports when a run of the slow one is due.
+/// Report of the fast half when a run of the slow one is due.
 #[derive(Clone, Debug)]
 pub(crate) struct Report {
     pub(crate) seen: Snapshot<f32>,
@@ -47,7 +47,7 @@ pub(crate) struct Wish {
     pub(crate) gains: Gains,
 }
 
-/// What a run of the slow half leaves for the fast one.
+/// Result of a run of the slow half for the fast one.
 #[derive(Clone, Debug)]
 pub(crate) struct Answer {
     pub(crate) command: Option<Command>,
@@ -201,7 +201,7 @@ fn uncommissioned(rate_hz: f64) -> StageSettings {
     settings
 }
 
-/// What the thread owns.
+/// Everything that the thread owns.
 struct Slow {
     half: SlowHalf<f32>,
     file: Option<FlashFile>,

@@ -1,4 +1,4 @@
-//! What a record says: circular deviation, largest error, reversal spike.
+//! The figures of a record: circular deviation, largest error, reversal spike.
 
 use std::fs;
 use std::path::Path;

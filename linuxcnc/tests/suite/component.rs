@@ -54,7 +54,7 @@ pub(crate) struct Component {
     /// Added to the position that LinuxCNC sees and commands, mm.
     pub(crate) origin_mm: f64,
     tick: u32,
-    /// Where the joints were when they were enabled, mm.
+    /// Positions of the joints when they were enabled, mm.
     start_mm: [f64; 3],
     _folder: tempfile::TempDir,
 }
@@ -133,7 +133,7 @@ impl Component {
         Self::try_start(parameters).expect("a component")
     }
 
-    /// Where LinuxCNC commands the joints in a tick, mm, and their velocity, mm/s: circles from rest.
+    /// Commanded positions of the joints in a tick, mm, and their velocity, mm/s: circles from rest.
     pub(crate) fn command(tick: u32) -> ([f64; 3], [f64; 3]) {
         let time_s = f64::from(tick) / RATE_HZ;
         // Starts within 0.2 s.

@@ -1,4 +1,4 @@
-//! What goes wrong, and that the output is zero in the period in which it is found.
+//! Faults of machine and files, and that the output is zero in the period in which it is found.
 
 use std::fs;
 use std::time::{Duration, Instant};

@@ -13,7 +13,7 @@ fn sine_mm(time_s: f64) -> f64 {
     2.0 * (TAU * time_s).sin()
 }
 
-/// What a reference makes of the sine, tick by tick.
+/// The samples that a reference makes of the sine, tick by tick.
 fn led(preview: Preview) -> Vec<Led> {
     let mut reference = CommandReference::new(RESOLUTION_MM, RATE_HZ, preview, PREVIEW_S, 2);
     (0..500)

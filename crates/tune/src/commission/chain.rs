@@ -29,7 +29,7 @@ const STEPS: [(&str, f64); 6] = [
     ("verdict", 0.14),
 ];
 
-/// What watches a commissioning; a function of the step and the share of the whole sees how far it is.
+/// Watches a commissioning; a function of the step and the share of the whole sees how far it is.
 pub trait Watch {
     /// Receives the step, and the share of the whole that is done, 0 to 1.
     fn progress(&mut self, step: &'static str, share: f64);
@@ -155,7 +155,7 @@ fn guarded(
     }
     step += 1;
     let mut softenings = 0;
-    let verification = loop {
+    let mut verification = loop {
         let pid = measuring_settings(&found.settings);
         if let Some((hum, true)) = knock.ringing(test_axis, &pid)?
             && softenings < models::MAX_SOFTENINGS
@@ -174,7 +174,6 @@ fn guarded(
             outcome => break outcome?,
         }
     };
-    let mut verification = verification;
     let rest = |axis: &mut dyn TestAxis, found: &Commissioned, verification: &Verification| {
         knock.ringing(axis, &verification.settings(&found.settings))
     };

@@ -7,6 +7,7 @@ use super::bootstrap::measuring_settings;
 use super::error::CommissionError;
 use crate::identify::at_rest::AtRest;
 use crate::identify::excitation::{Excitation, Waveform};
+use crate::identify::frf;
 use crate::identify::motion::{Candidate, MotionFitSettings, fit_motion, recommended, shuttle};
 use crate::identify::response::FrequencyResponse;
 use crate::identify::revise::{ReviseError, Revision};
@@ -37,8 +38,6 @@ const EXCITATIONS: [(f64, f64); 5] = [
 ];
 /// Highest frequency of the excitation, Hz.
 const HIGHEST_HZ: f64 = 400.0;
-/// The same over the control rate.
-const BAND_SHARE: f64 = 0.36;
 /// Period of the excitation, s.
 const PERIOD_S: f64 = 0.5;
 /// Periods of the excitation.
@@ -60,7 +59,7 @@ impl CrossCheck {
         let sliding = &settings.friction.sliding;
         let breakaway_v =
             0.5 * (sliding.positive.curve.breakaway_v + sliding.negative.curve.breakaway_v);
-        let highest_hz = HIGHEST_HZ.min(BAND_SHARE * test_axis.info().rate_hz);
+        let highest_hz = HIGHEST_HZ.min(frf::BAND_SHARE * test_axis.info().rate_hz);
         let excitation = |(lowest_hz, ratio)| Excitation {
             waveform: Waveform::Multisine,
             rms_v: ratio * breakaway_v,

@@ -30,5 +30,4 @@ pub use guard::{Guard, Run};
 pub use models::Measurements;
 pub use own_stage::{OwnStageError, commission_stage};
 pub use plan::{Planned, plan, stray_mm};
-pub use rest::Rest;
 pub use ringing::{Ringing, ringing};

@@ -29,11 +29,11 @@ const NOISE_RATIO: f64 = 2.0;
 
 /// Result of a test at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rest {
+pub(super) struct Rest {
     /// Largest RMS deviation after a knock, mm.
-    pub rms_mm: f64,
+    pub(super) rms_mm: f64,
     /// The oscillation, where the axis does not come to rest.
-    pub hum: Option<Ringing>,
+    pub(super) hum: Option<Ringing>,
 }
 
 /// Friction and noise of an axis, as far as a knock has to know them.
@@ -77,7 +77,7 @@ impl Knock {
         test_axis: &mut dyn TestAxis,
         settings: &AxisSettings,
     ) -> Result<Result<Rest, ExperimentError>, MachineError> {
-        // A knock is motion that no output has caused, to a monitor that holds the encoder against the plant.
+        // Behind a push, the monitor that holds the encoder against the plant may take a healthy axis for a faulty one.
         let mut settings = settings.clone();
         settings.plant = None;
         settings.feedforward.learning = None;

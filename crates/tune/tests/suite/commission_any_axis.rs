@@ -29,7 +29,7 @@ fn commissioned(axis: AxisParameters, travel_mm: f64) -> Commissioned {
     commission(&mut test_axis, &base, &request, &mut |_, _| {}).unwrap()
 }
 
-/// What a commissioning reports: its steps, and the PID with the step in which it came.
+/// The reports of a commissioning: its steps, and the PID with the step in which it came.
 #[derive(Default)]
 struct Reported {
     step: &'static str,

@@ -114,7 +114,7 @@ const SHORT_MM: f64 = 60.0;
 /// Factor on the period there.
 const SHORT_PERIOD: f64 = 0.5;
 /// Highest frequency that is chosen over the control rate.
-const BAND_SHARE: f64 = 0.36;
+pub(crate) const BAND_SHARE: f64 = 0.36;
 /// Share of the largest velocity that the bias takes at most: the excitation comes on top.
 const BIAS_SHARE: f64 = 0.4;
 /// Slowest pass that is chosen for a short travel, mm/s.

@@ -13,5 +13,6 @@ mod measure;
 mod saved;
 
 pub use estimate::{Estimate, Estimator, estimate};
+pub(crate) use measure::BAND_SHARE;
 pub use measure::{FrfError, FrfMeasurement, FrfSettings, measure, standstill};
 pub use saved::{SavedError, SavedSettings, response_of};
