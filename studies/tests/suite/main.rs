@@ -6,6 +6,7 @@ mod command;
 mod cuts;
 mod friction_truths;
 mod learning;
+mod motor_test;
 mod random_axes;
 mod random_faults;
 mod report_command;

@@ -24,7 +24,9 @@
 //! the filter, shifted to the left as far as there is room. The comparison is made every fourth tick, of each axis in
 //! another: the sums lose nothing by it.
 //!
-//! Without a model, an axis in open loop has a budget in volt-seconds in place of the distance.
+//! Without a model, an axis in open loop has a budget in volt-seconds in place of the distance. What friction holds is not known then:
+//! for a while after a motion that was seen, only more voltage than there was at that motion is spent, since an axis that friction holds
+//! still yields a little whenever the voltage changes.
 //!
 //! [`Overspeed`]: super::monitor::Overspeed
 
@@ -46,6 +48,9 @@ const FORGET_S: f64 = 0.3;
 
 /// Largest speed, and largest gain of speed from one comparison to the next.
 const MAX_SPEED: f64 = (1u32 << 28) as f64;
+
+/// Time for which a motion shows, without a model, that the encoder is alive, s.
+const ALIVE_S: f64 = 0.025;
 
 /// Counts within which an encoder with one dead line dithers.
 const DITHER_COUNTS: u32 = 2;
@@ -159,6 +164,8 @@ pub struct Plausibility {
     /// As `distance`.
     ahead: i32,
     breakaway: i32,
+    /// Comparisons after a motion in which only more than the force at that motion counts, in open loop.
+    alive_for: u32,
     /// Share of a speed that is lost, 2^-32.
     drag: i32,
     /// Right shift from a distance to what is forgotten of it.
@@ -203,7 +210,8 @@ pub struct PlausibilityState {
     force: i32,
     /// That force at the last motion that was seen.
     anchor: i32,
-    /// Counts since.
+    /// Comparisons and counts since.
+    silent: u32,
     travelled: i32,
     /// Speed and distance of the model since.
     modelled: i32,
@@ -319,6 +327,7 @@ impl Plausibility {
             // What friction takes up is unknown.
             held: i32::MAX,
             breakaway: units(breakaway_v),
+            alive_for: (ALIVE_S / (INTERVAL_TICKS * period_s)) as u32,
             forget_shift: whole_log2(FORGET_S / (INTERVAL_TICKS * period_s)),
             distance: units(budget_v_s / period_s) >> DISTANCE_BITS,
             ..Self::of_words(words, UNITS_PER_VOLT)
@@ -514,13 +523,19 @@ impl Plausibility {
         state.travelled = state.travelled.saturating_add(counts);
         if state.travelled.unsigned_abs() > DITHER_COUNTS {
             state.travelled = 0;
+            state.silent = 0;
             state.anchor = state.force;
             state.modelled = 0;
         } else {
+            state.silent = state.silent.saturating_add(1);
             let held = beyond(state.force.saturating_sub(state.anchor), self.held);
             let mut force = larger(held, self.beyond_sliding(state));
             if open && force == 0 {
-                force = beyond(state.force, self.breakaway);
+                let mut allowed = self.breakaway;
+                if state.silent < self.alive_for {
+                    allowed = allowed.max(state.anchor.saturating_mul(state.force.signum()));
+                }
+                force = beyond(state.force, allowed);
             }
             state.modelled = if self.modelled {
                 let lost = part(state.modelled, self.drag);

@@ -151,6 +151,56 @@ fn an_axis_without_a_model_has_its_budget_in_volt_seconds_in_open_loop_and_none_
     }
 }
 
+/// Levels that change every 8 ms, as those of the motor test.
+fn levels(time_s: f64) -> f64 {
+    if (time_s / 0.016).fract() < 0.5 {
+        1.0
+    } else {
+        0.4
+    }
+}
+
+#[test]
+fn without_a_model_friction_that_holds_an_axis_is_no_dead_encoder_while_the_axis_yields_to_each_change_of_the_voltage()
+ {
+    for words in AMPLIFIERS {
+        let axis = Plausibility::without_model(8e-3, 0.2, words, PERIOD_S);
+        // Stiffness of friction 80 V/mm: 15 counts a volt beyond 0.4 V.
+        for (sign, yields_mm_per_v, found) in [
+            (1.0, 1.0 / 80.0, false),
+            (-1.0, 1.0 / 80.0, false),
+            (1.0, 0.0, true),
+        ] {
+            let volts = |time_s| sign * levels(time_s);
+            let motion = |time_s: f64| (yields_mm_per_v * volts((time_s - 1e-3).max(0.0)), 0.0);
+            let fault = time_until_found(&axis, words, true, volts, motion);
+            assert_eq!(
+                fault.is_some(),
+                found,
+                "{sign}, {yields_mm_per_v} mm/V: {fault:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn without_a_model_an_encoder_that_dies_at_speed_is_found_when_a_motion_is_old_and_the_budget_spent()
+ {
+    const DIES_S: f64 = 0.5;
+    const ALIVE_S: f64 = 0.025;
+    for words in AMPLIFIERS {
+        for volts in [0.5, -1.0, 3.0] {
+            let (budget_v_s, breakaway_v) = (8e-3, 0.2);
+            let axis = Plausibility::without_model(budget_v_s, breakaway_v, words, PERIOD_S);
+            let motion = |time_s: f64| (20.0 * volts * time_s.min(DIES_S), 0.0);
+            let found = time_until_found(&axis, words, true, |_| volts, motion);
+            let expected = DIES_S + ALIVE_S + budget_v_s / (volts.abs() - breakaway_v);
+            let late_s = found.expect("found") - expected;
+            assert!(late_s.abs() < 3e-3, "{words:?}, {volts} V: {late_s} s late");
+        }
+    }
+}
+
 #[test]
 fn an_encoder_that_stands_is_found_when_the_model_has_gone_the_distance() {
     let model = model();
