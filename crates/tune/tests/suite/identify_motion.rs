@@ -369,7 +369,16 @@ fn records_that_determine_too_little_are_refused_with_what_they_lack() {
 
 /// A record of an axis of 2e-5 V s²/mm, 2e-3 V s/mm and 0.02 V of offset under PD control, with a Coulomb friction that turns at once;
 /// `step_s` gives the time from one row to the next.
-fn simulated_record(coulomb_v: f64, mut step_s: impl FnMut(usize) -> f64) -> Vec<[f64; 3]> {
+fn simulated_record(coulomb_v: f64, step_s: impl FnMut(usize) -> f64) -> Vec<[f64; 3]> {
+    loaded_record(coulomb_v, |_| 0.0, step_s)
+}
+
+/// The same under a load that depends on the place, V over mm.
+fn loaded_record(
+    coulomb_v: f64,
+    load_v: impl Fn(f64) -> f64,
+    mut step_s: impl FnMut(usize) -> f64,
+) -> Vec<[f64; 3]> {
     let reference = |t: f64| {
         let slow = 45.0 * (TAU * 0.4 * t).sin() * (TAU * 0.13 * t + 1.0).sin();
         slow + 6.0 * (TAU * 1.7 * t).sin()
@@ -384,7 +393,7 @@ fn simulated_record(coulomb_v: f64, mut step_s: impl FnMut(usize) -> f64) -> Vec
         rows.push([time, measured, voltage]);
         let step = step_s(rows.len());
         for _ in 0..40 {
-            let force = voltage - 0.02 - 2e-3 * velocity;
+            let force = voltage - 0.02 - 2e-3 * velocity - load_v(position);
             let h = step / 40.0;
             if f64::abs(velocity) < 1e-3 && f64::abs(force) < coulomb_v {
                 velocity = 0.0;
@@ -455,6 +464,20 @@ fn the_plainest_model_of_an_axis_with_coulomb_friction_or_none_is_recommended() 
         );
         assert!((offset_v - 0.02).abs() < 0.002, "{offset_v}");
     }
+}
+
+/// A load that rises in the middle of the travel and falls towards its ends: a straight line is as wrong there as it is right between.
+#[test]
+fn a_change_along_the_travel_that_does_not_hold_at_its_ends_is_not_recommended() {
+    let along = |load_v: &dyn Fn(f64) -> f64| {
+        let (record, _) = read(&loaded_record(0.1, load_v, |_| 2e-3), false).unwrap();
+        let candidates = fitted(&record, &MotionFitSettings::default());
+        let best = recommended(&candidates).unwrap();
+        println!("{:?}", best.model.structure);
+        best.model.structure.along_travel
+    };
+    assert!(along(&|place_mm| 1e-3 * place_mm));
+    assert!(!along(&|place_mm| 0.05 * (TAU * place_mm / 75.0).sin()));
 }
 
 #[test]

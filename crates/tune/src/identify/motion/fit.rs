@@ -23,6 +23,8 @@ pub struct Candidate {
     pub validation_error: Option<f64>,
     /// The errors that it is ranked by: on withheld motion, or without any on that of the fit.
     errors: Errors,
+    /// The errors at the ends of the record and of its travel, from fits without them; nothing if nothing was withheld.
+    outside: Option<Errors>,
     /// The errors on the record of the fit.
     fitted: Errors,
     /// True if its motion was fitted, too.
@@ -80,6 +82,8 @@ pub struct Rows {
 
 /// Parts of the trajectory that are withheld, one at a time.
 const PARTS: usize = 8;
+/// Share of the record, in time, and of the travel that each end has which is withheld.
+const END_SHARE: f64 = 0.2;
 /// Reversals below which nothing is withheld.
 const LEAST_REVERSALS: usize = 3;
 /// Largest error over the smallest of a model that is as good as the best: the simplest of them is recommended.
@@ -106,12 +110,12 @@ pub fn fit_motion(
 ) -> Result<Vec<Candidate>, MotionFitError> {
     check(recording, settings)?;
     let signals = Signals::new(recording, settings);
-    let parts = parts(&signals, settings)?;
+    let splits = splits(&signals, settings)?;
     let done = std::sync::atomic::AtomicUsize::new(0);
     let fitted: Vec<Result<Candidate, MotionFitError>> = Structure::ALL
         .into_par_iter()
         .map(|structure| {
-            let candidate = candidate(&signals, settings, structure, &parts);
+            let candidate = candidate(&signals, settings, structure, splits.as_ref());
             let count = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             progress(count as f64 / Structure::ALL.len() as f64);
             candidate
@@ -208,12 +212,20 @@ fn check(recording: &Recording, settings: &MotionFitSettings) -> Result<(), Moti
     Ok(())
 }
 
-/// The part of the trajectory that each row belongs to; nothing of it where too few reversals leave too little to withhold.
+/// Rows that are withheld: of each fit, true for each of its rows.
+struct Splits {
+    /// Parts of the trajectory, wherever they occur.
+    parts: Vec<Vec<bool>>,
+    /// Beginning and end of the record, and the ends of its travel: what is found between them need not hold there.
+    ends: Vec<Vec<bool>>,
+}
+
+/// The rows to withhold; nothing where too few reversals leave too little of them.
 /// A trajectory that repeats itself is divided within one repetition, so that a part is withheld wherever it occurs.
-fn parts(
+fn splits(
     signals: &Signals,
     settings: &MotionFitSettings,
-) -> Result<Option<Vec<usize>>, MotionFitError> {
+) -> Result<Option<Splits>, MotionFitError> {
     let velocity = signals.decimated(&signals.velocity_mm_s, settings);
     let moving = signals.moving_mm_s();
     let share = |sign: f64| {
@@ -235,8 +247,22 @@ fn parts(
     }
     let position = signals.decimated(&signals.position_mm, settings);
     let period = repetition(&position).unwrap_or(position.len());
+    let rows = position.len();
     let part = |row: usize| (row % period) * PARTS / period;
-    Ok(Some((0..position.len()).map(part).collect()))
+    let parts = (0..PARTS).map(|withheld| (0..rows).map(|row| part(row) == withheld).collect());
+    let lowest = position.iter().copied().fold(f64::INFINITY, f64::min);
+    let highest = position.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let place = |row: usize| (position[row] - lowest) / (highest - lowest);
+    let time = |row: usize| row as f64 / rows as f64;
+    let end = |share: &dyn Fn(usize) -> f64, upper: bool| {
+        let share = |row| if upper { 1.0 - share(row) } else { share(row) };
+        (0..rows).map(|row| share(row) < END_SHARE).collect()
+    };
+    let ends = [false, true].map(|upper| [end(&place, upper), end(&time, upper)]);
+    Ok(Some(Splits {
+        parts: parts.collect(),
+        ends: ends.into_iter().flatten().collect(),
+    }))
 }
 
 /// Rows after which a trajectory repeats itself; nothing if it does not.
@@ -268,7 +294,7 @@ fn candidate(
     signals: &Signals,
     settings: &MotionFitSettings,
     structure: Structure,
-    parts: &Option<Vec<usize>>,
+    splits: Option<&Splits>,
 ) -> Result<Candidate, MotionFitError> {
     let regression = Regression::new(signals, settings, structure, signals.span());
     let sliding = regression.sliding_rows(signals.moving_mm_s());
@@ -277,10 +303,9 @@ fn candidate(
         false => (0..regression.rows()).collect(),
     };
     let whole = Solution::find(&regression, structure, &rows)?;
-    let withheld = match parts {
-        Some(parts) => withheld(&regression, structure, parts, &sliding),
-        None => None,
-    };
+    let without = |splits: &[Vec<bool>]| withheld(&regression, structure, splits, &sliding);
+    let withheld = splits.and_then(|splits| without(&splits.parts));
+    let outside = splits.and_then(|splits| without(&splits.ends));
     let others = withheld.as_ref().map_or(&[][..], |found| &found.solutions);
     let described = described(signals, settings, structure, &regression, whole, others)?;
     Ok(Candidate {
@@ -288,6 +313,7 @@ fn candidate(
         errors: withheld
             .as_ref()
             .map_or(described.fitted, |found| found.errors),
+        outside: outside.map(|found| found.errors),
         ..described
     })
 }
@@ -317,6 +343,7 @@ fn described(
     Ok(Candidate {
         validation_error: None,
         errors: fitted,
+        outside: None,
         fitted,
         refined: false,
         rows: Rows {
@@ -334,15 +361,29 @@ fn described(
     })
 }
 
+/// True if no simpler model is better at the ends of the record and of its travel, without which both were fitted.
+fn holds_outside(candidate: &Candidate, candidates: &[Candidate]) -> bool {
+    let Some(own) = candidate.outside else {
+        return true;
+    };
+    candidates
+        .iter()
+        .filter(|other| other.model.estimates.len() < candidate.model.estimates.len())
+        .filter_map(|other| other.outside)
+        .all(|other| own.sliding <= as_good_as(other.sliding))
+}
+
 /// The model to use: the simplest of those whose error while sliding is within two per cent of the smallest, or within 0.15 % of
-/// the voltage, and which also reversals do not contradict. The errors are those on withheld motion; where nothing was withheld of
+/// the voltage, and which also reversals do not contradict, nor the ends of the record and of its travel a simpler one. The errors are those on withheld motion; where nothing was withheld of
 /// any model, those on the record of the fit. A model of which nothing could be withheld is not compared with others.
 pub fn recommended(candidates: &[Candidate]) -> Option<&Candidate> {
     let validated = candidates
         .iter()
         .any(|candidate| candidate.validation_error.is_some());
     let errors = |candidate: &Candidate| {
-        let compared = candidate.validation_error.is_some() == validated && !candidate.refined;
+        let compared = candidate.validation_error.is_some() == validated
+            && !candidate.refined
+            && holds_outside(candidate, candidates);
         compared.then_some(candidate.errors)
     };
     let errors: Vec<Option<Errors>> = candidates.iter().map(errors).collect();
@@ -390,32 +431,32 @@ fn simplest<'a>(candidates: &'a [Candidate], errors: &[Option<Errors>]) -> Optio
         .map(|(candidate, _)| candidate)
 }
 
-/// Fits with one part of the trajectory withheld at a time, and what they missed there.
+/// Fits with some of the rows withheld, and what they missed there.
 struct Withheld {
     solutions: Vec<Solution>,
     errors: Errors,
 }
 
-/// Withholds each part in turn; nothing if what is left determines too little.
+/// Withholds the rows of each split in turn; nothing if what is left determines too little.
 fn withheld(
     regression: &Regression<'_>,
     structure: Structure,
-    parts: &[usize],
+    splits: &[Vec<bool>],
     sliding: &[usize],
 ) -> Option<Withheld> {
     let (mut missed, mut total) = (0.0, 0.0);
     let (mut sliding_missed, mut sliding_total) = (0.0, 0.0);
-    let mut slides = vec![false; parts.len()];
+    let mut slides = vec![false; regression.rows()];
     for &row in sliding {
         slides[row] = true;
     }
     let mut solutions = Vec::new();
     // Summed up in their order, so that the number of threads does not matter.
-    let found: Vec<(Vec<usize>, Result<Solution, MotionFitError>)> = (0..PARTS)
-        .into_par_iter()
-        .map(|part| {
+    let found: Vec<(Vec<usize>, Result<Solution, MotionFitError>)> = splits
+        .par_iter()
+        .map(|withheld| {
             let (judged, fitted): (Vec<usize>, Vec<usize>) =
-                (0..parts.len()).partition(|&row| parts[row] == part);
+                (0..regression.rows()).partition(|&row| withheld[row]);
             let fitted: Vec<usize> = match structure.sliding {
                 true => fitted.into_iter().filter(|&row| slides[row]).collect(),
                 false => fitted,
