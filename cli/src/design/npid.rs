@@ -83,6 +83,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let rule = NonlinearRule {
         sector_share: arguments.sector_share,
+        largest: f64::INFINITY,
         range,
     };
     let Some(gain) = choose_nonlinear(&gains, proof.popov, &rule) else {

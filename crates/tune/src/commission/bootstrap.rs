@@ -138,6 +138,7 @@ pub fn measuring_settings(base: &AxisSettings) -> AxisSettings {
     settings.commissioned = true;
     settings.feedback.law = LawKind::Pid;
     settings.feedforward.kind = FeedforwardKind::None;
+    settings.feedforward.learning = None;
     settings.limits.following_error_mm = FOLLOWING_ERROR_MM;
     settings.limits.following_error_max_mm = FOLLOWING_ERROR_MM;
     settings

@@ -21,6 +21,8 @@ pub struct CommissionSettings {
     pub target: Option<Target>,
     /// Share of the Popov bound that the nonlinear gain may take, 0 to 1.
     pub sector_share: f64,
+    /// Largest `|S|` of the loop at the nonlinear gain's largest value; the Popov bound alone counts if it is infinite.
+    pub nonlinear_peak: f64,
     /// True if laws are tried on the axis, and the best is chosen that is nowhere worse than the PID alone. Without trials the
     /// settings are the N-PID's with combined feedforward.
     pub trials: bool,
@@ -29,11 +31,13 @@ pub struct CommissionSettings {
 }
 
 impl Default for CommissionSettings {
-    /// The best PID, and 75 % of the Popov bound.
+    /// The best PID, and 75 % of the Popov bound, or as much gain as leaves `|S|` within 2.5: what lies beyond the loop is never made
+    /// larger by more than that.
     fn default() -> Self {
         Self {
             target: None,
             sector_share: 0.75,
+            nonlinear_peak: 2.5,
             trials: true,
             friction: StaticFrictionSettings {
                 velocities_mm_s: (0.1, 40.0),
@@ -52,6 +56,7 @@ impl CommissionSettings {
                 phase_margin_deg: 54.2,
                 crossover_hz: None,
             }),
+            nonlinear_peak: f64::INFINITY,
             trials: false,
             ..Self::default()
         }

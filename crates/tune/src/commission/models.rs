@@ -19,7 +19,7 @@ use super::commissioned::{ASSUMED_RANGE_MM, CommissionSettings, Commissioned};
 use super::error::CommissionError;
 use super::ringing::Ringing;
 use super::verify::VerifyError;
-use crate::design::npid::{NonlinearRule, Range, choose_nonlinear};
+use crate::design::npid::{NonlinearRule, Range, choose_nonlinear, gain_within_peak};
 use crate::design::{
     Form, PidRequest, Process, best_filter_s, best_pid, design_pid, modal_pid, noise_voltage_v,
 };
@@ -338,11 +338,19 @@ impl Models {
         // The rigid model's bound is what the firmware checks; with modes the circle criterion must hold, too.
         let bound = filtered_sector_bound(&plant.plant, pid, filters, 1.0 / rate_hz)
             .min(controller.circle_bound);
+        let largest = gain_within_peak(
+            &process(&plant, filters),
+            pid,
+            sampled(rate_hz),
+            request.nonlinear_peak,
+            bound,
+        );
         let nonlinear = choose_nonlinear(
             pid,
             bound,
             &NonlinearRule {
                 sector_share: request.sector_share,
+                largest,
                 range: Range::Breakaway(breakaway_v),
             },
         );

@@ -18,6 +18,8 @@ pub struct NonlinearRule {
     /// Largest gain as a share of the Popov bound k_max; above zero, at most one. What is left is for the axis to
     /// change: the bound falls in proportion as A grows.
     pub sector_share: f64,
+    /// Largest gain whatever that share is, as of [`gain_within_peak`]; infinite for none.
+    pub largest: f64,
     pub range: Range,
 }
 
@@ -32,10 +34,11 @@ pub enum Range {
 }
 
 impl Default for NonlinearRule {
-    /// 75 % of the bound over 0.1 mm.
+    /// 75 % of the bound over 0.1 mm, however large |S| becomes.
     fn default() -> Self {
         Self {
             sector_share: 0.75,
+            largest: f64::INFINITY,
             range: Range::Fixed(0.1),
         }
     }
@@ -113,6 +116,51 @@ fn line_and_circle(process: &Process, gains: &PidGains) -> (f64, f64) {
     (low, 1.0 - 1.0 / foot(0.0))
 }
 
+/// The largest gain in front of a PID with which `|S|` stays within `peak`, at most `most`: what is stable by the Popov bound may still
+/// amplify disturbances by a multiple. One if the PID itself exceeds it.
+pub fn gain_within_peak(
+    process: &Process,
+    gains: &PidGains,
+    form: Form,
+    peak: f64,
+    most: f64,
+) -> f64 {
+    let keeps = |gain: f64| {
+        process
+            .margins(&scaled(gains, gain), form)
+            .is_ok_and(|margins| margins.sensitivity_peak <= peak)
+    };
+    if !keeps(1.0) {
+        return 1.0;
+    }
+    if keeps(most) {
+        return most;
+    }
+    let (mut low, mut high) = (1.0, most);
+    while high - low > GAIN_TOLERANCE {
+        let middle = 0.5 * (low + high);
+        if keeps(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+/// A PID behind a gain.
+fn scaled(gains: &PidGains, gain: f64) -> PidGains {
+    PidGains {
+        kp_v_per_mm: gain * gains.kp_v_per_mm,
+        ki_v_per_mm_s: gain * gains.ki_v_per_mm_s,
+        kd_v_s_per_mm: gain * gains.kd_v_s_per_mm,
+        ..*gains
+    }
+}
+
+/// Accuracy of [`gain_within_peak`].
+const GAIN_TOLERANCE: f64 = 1e-3;
+
 /// The bounds of emax, mm.
 const RANGE_MM: (f64, f64) = (1e-3, 10.0);
 
@@ -122,7 +170,7 @@ pub fn choose_nonlinear(
     sector_bound: f64,
     rule: &NonlinearRule,
 ) -> Option<NonlinearGain> {
-    let largest = rule.sector_share * sector_bound;
+    let largest = (rule.sector_share * sector_bound).min(rule.largest);
     let range_mm = match rule.range {
         Range::Breakaway(volts) => volts / gains.kp_v_per_mm,
         Range::Fixed(range_mm) => range_mm,

@@ -5,10 +5,11 @@ use std::f64::consts::TAU;
 use quadrant_law::control::plant_model::PlantModel;
 use quadrant_settings::popov::sector_proof;
 use quadrant_settings::presets::{X_GAINS, X_PLANT};
-use quadrant_sim::loop_shape::{ContinuousLoop, OpenLoop};
-use quadrant_tune::design::npid::{NonlinearRule, Range, choose_nonlinear};
+use quadrant_sim::loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
+use quadrant_tune::design::npid::{NonlinearRule, Range, choose_nonlinear, gain_within_peak};
 use quadrant_tune::design::robustness::{Robustness, RobustnessError, Uncertainty, robustness};
 use quadrant_tune::design::time_varying::{Switching, VaryingLoop};
+use quadrant_tune::design::{Form, Process};
 
 const PERIOD_S: f64 = 1e-4;
 const CROSSOVER_HZ: f64 = 64.9;
@@ -62,9 +63,42 @@ fn the_smallest_destabilising_gain_lies_between_the_two_bounds_and_close_to_popo
 }
 
 #[test]
+fn the_largest_gain_leaves_the_sensitivity_within_its_peak_and_hardly_more_exceeds_it() {
+    let form = Form::Sampled {
+        sample_time_s: PERIOD_S,
+        computation_delay_s: 0.0,
+    };
+    let process = Process::Model(X_PLANT);
+    for peak in [2.0, 2.5, 3.5] {
+        let largest = gain_within_peak(&process, &X_GAINS, form, peak, 10.0);
+        // |S| read off the frequency response, by a sweep of its own.
+        let loudest = |gain: f64| {
+            let open_loop = SampledLoop::new(&X_PLANT, &X_GAINS, PERIOD_S, 0.0);
+            (0..20_000)
+                .map(|i| 10.0_f64.powf(f64::from(i) * 1e-4 + 1.0) * TAU)
+                .map(|omega| (open_loop.response(omega) * gain + 1.0).norm().recip())
+                .fold(0.0, f64::max)
+        };
+        assert!(
+            loudest(largest) < 1.001 * peak,
+            "{peak}: {}",
+            loudest(largest)
+        );
+        assert!(
+            loudest(1.01 * largest) > peak,
+            "{peak}: {}",
+            loudest(1.01 * largest)
+        );
+    }
+    assert_eq!(gain_within_peak(&process, &X_GAINS, form, 1.01, 10.0), 1.0);
+    assert_eq!(gain_within_peak(&process, &X_GAINS, form, 1e9, 1.1), 1.1);
+}
+
+#[test]
 fn the_gain_takes_its_share_of_the_bound_over_the_range_that_friction_causes() {
     let rule = NonlinearRule {
         sector_share: 0.75,
+        largest: 5.0,
         range: Range::Breakaway(0.15),
     };
     let chosen = choose_nonlinear(&X_GAINS, 3.0, &rule).unwrap();

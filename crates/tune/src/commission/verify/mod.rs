@@ -4,6 +4,7 @@
 
 mod bench;
 mod law_result;
+mod learn;
 mod sines;
 mod small;
 mod trials;
@@ -112,7 +113,7 @@ impl VerifyError {
 ///
 /// Chooses the best law that is not worse than the PID, also on sines that were withheld until then. Where there is none, other kinds and
 /// shares take their turn, and then what was tried, without the nonlinear gain. A choice that is worse on small slow sines is replaced by less
-/// of it that is not.
+/// of it that is not. The choice then learns, where that is not worse either.
 ///
 /// # Errors
 /// A PID whose settings are refused, that is stopped, or that oscillates.
@@ -150,6 +151,7 @@ fn choose(bench: &mut Bench<'_>, settings: &AxisSettings) -> Result<Verification
     trials.rescale()?;
     let chosen = trials.confirm()?;
     let chosen = trials.keep_small(chosen)?;
+    let chosen = trials.let_learn(chosen)?;
     Ok(trials.ended(chosen))
 }
 
@@ -157,20 +159,20 @@ fn choose(bench: &mut Bench<'_>, settings: &AxisSettings) -> Result<Verification
 pub(super) fn lasts_s(info: &AxisInfo) -> f64 {
     let runs = |index: usize| {
         if index >= CHOICE_SINES {
-            return 2;
+            return 3;
         }
         let compared = if index < COMPARISON_SINES {
             KINDS.len()
         } else {
             1
         };
-        // The PID and the N-PID alone, the best law once more, and the PID again.
-        3 + compared + REPEATS * usize::from(index == 0)
+        // The PID and the N-PID alone, the best law once more, also learning, and the PID again.
+        4 + compared + REPEATS * usize::from(index == 0)
     };
     let usual = sines(info).into_iter().enumerate();
     let usual_s = usual.map(|(index, sine)| runs(index) as f64 * one_lasts_s(&sine, SCORED_CYCLES));
-    // The PID alone and the chosen law.
+    // The PID alone and the chosen law, which learns at last.
     let small = small_sines(info).into_iter();
-    let small_s = small.map(|small| 2.0 * one_lasts_s(&small.sine, small.scored_cycles));
+    let small_s = small.map(|small| 3.0 * one_lasts_s(&small.sine, small.scored_cycles));
     usual_s.chain(small_s).sum()
 }

@@ -163,7 +163,7 @@ impl Trials<'_, '_> {
     }
 
     /// True if a law that ran on the small sines is worse than the PID there; it is added to those that were refused.
-    fn refuses_when_small(&mut self, law: &LawResult) -> bool {
+    pub(super) fn refuses_when_small(&mut self, law: &LawResult) -> bool {
         let worst = worst_when_small(law, &self.laws[0], self.bench.small_sines);
         let is_refused = worst.is_some() || law.stopped.is_some();
         if is_refused {

@@ -58,7 +58,8 @@ pub(super) const MOST_RUNS: usize = {
     let confirmed = (1 + MAX_CANDIDATES) * withheld;
     let instead = kinds * (SINES.len() - COMPARISON_SINES) + shares * SINES.len();
     let small = (2 + REMEDIES.len()) * SMALL_SINES.len() + REMEDIES.len() * SINES.len();
-    alone + compared + refined + scaled + confirmed + instead + small
+    let learning = SINES.len() + SMALL_SINES.len();
+    alone + compared + refined + scaled + confirmed + instead + small + learning
 };
 
 /// Trials under way.
