@@ -379,8 +379,9 @@ fn feedforward_that_is_worse_than_the_pid_is_not_chosen() {
     let mut slippery = SimulatedTestAxis::new(0, x().with_friction(0.2), 2);
     let verification =
         quadrant_tune::commission::verify::verify(&mut slippery, &settings, &mut |_| {}).unwrap();
-    let whole = &verification.laws[2];
-    assert!(verification.against_pid(whole).0 > 1.5, "{}", whole.law);
+    let against = |law| verification.against_pid(law).0;
+    let worst = verification.laws.iter().map(against).fold(0.0, f64::max);
+    assert!(worst > 1.5, "{worst}");
     let (worst, _) = verification.against_pid(verification.chosen());
     assert!(worst <= 1.01, "{}", verification.chosen().law);
 }
@@ -460,7 +461,7 @@ fn an_axis_whose_first_test_is_quicker_than_its_spring_finds_its_model_on_a_shor
     });
 }
 
-/// RMS deviation of the axis from its mean, mm, in each of the last five tenths of a second after it was knocked: the largest.
+/// RMS deviation of the axis from a straight line, since it may creep back, mm, in each of the last five tenths of a second after it was knocked: the largest.
 fn after_a_knock(axis: &mut SimulatedTestAxis, knock_v: f64) -> f64 {
     let mut injection_v = vec![knock_v; 40];
     injection_v.resize(15_000, 0.0);
@@ -474,9 +475,13 @@ fn after_a_knock(axis: &mut SimulatedTestAxis, knock_v: f64) -> f64 {
     let position_mm = axis.perform(&held, &mut |_| {}).unwrap().position_mm;
     let tail = &position_mm[position_mm.len() - 5000..];
     let deviation = |part: &[f64]| {
-        let mean = part.iter().sum::<f64>() / part.len() as f64;
-        let square = part.iter().map(|mm| (mm - mean).powi(2)).sum::<f64>();
-        (square / part.len() as f64).sqrt()
+        let count = part.len() as f64;
+        let mean = part.iter().sum::<f64>() / count;
+        let time = |index: usize| (index as f64 + 0.5) / count - 0.5;
+        let moment = |(index, mm): (usize, &f64)| time(index) * mm;
+        let slope = 12.0 * part.iter().enumerate().map(moment).sum::<f64>() / count;
+        let off = |(index, mm): (usize, &f64)| (mm - mean - slope * time(index)).powi(2);
+        (part.iter().enumerate().map(off).sum::<f64>() / count).sqrt()
     };
     tail.chunks(1000).map(deviation).fold(0.0, f64::max)
 }

@@ -2,8 +2,6 @@
 //!
 //! Learning also takes the feedforward back where the error would be smaller without it.
 
-use quadrant_law::learning::LearningSettings;
-
 use super::VerifyError;
 use super::law_result::MAX_SCATTER_RATIO;
 use super::trials::Trials;
@@ -20,7 +18,7 @@ impl Trials<'_, '_> {
             return Ok(chosen);
         }
         let mut settings = fixed.settings.clone();
-        settings.feedforward.learning = Some(LearningSettings::DEFAULT);
+        settings.feedforward.learning = Some(self.learning);
         let name = format!("{}, learning", fixed.law);
         // An axis that is too late for it, or whose law has no PID, is refused.
         let Ok((mut found, _)) = self.bench.try_law(&name, &settings, self.bench.sines.len())

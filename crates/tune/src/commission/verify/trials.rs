@@ -1,6 +1,7 @@
 //! The phases of the trials: each adds laws that ran, the last one chooses.
 
 use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::learning::LearningSettings;
 use quadrant_settings::AxisSettings;
 
 use super::super::bootstrap::measuring_settings;
@@ -67,6 +68,8 @@ pub(super) struct Trials<'a, 'b> {
     pub(super) bench: &'a mut Bench<'b>,
     /// The commissioned settings, with all that they feed forward.
     full: AxisSettings,
+    /// Learning, as the settings ask for it, or as it is by default.
+    pub(super) learning: LearningSettings,
     /// The PID alone, and the N-PID alone.
     pub(super) pid: AxisSettings,
     npid: AxisSettings,
@@ -108,9 +111,13 @@ impl<'a, 'b> Trials<'a, 'b> {
         let mut laws = vec![alone];
         let nonlinear = bench.try_law("N-PID", &npid, CHOICE_SINES);
         laws.extend(nonlinear.ok().map(|found| found.0));
+        // Laws are compared as they are at first.
+        let mut full = settings.clone();
+        let learning = full.feedforward.learning.take().unwrap_or_default();
         Ok(Self {
             bench,
-            full: settings.clone(),
+            full,
+            learning,
             pid,
             npid,
             laws,
