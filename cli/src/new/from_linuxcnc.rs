@@ -129,7 +129,7 @@ struct Joint<'a> {
     ini: &'a Ini,
     hal: &'a Hal,
     number: usize,
-    /// Its section: `JOINT_0`, or `AXIS_0` of LinuxCNC before 2.8.
+    /// Its section: of the joint, or of the axis in LinuxCNC before 2.8.
     section: String,
     unit_mm: f64,
 }
