@@ -115,6 +115,8 @@ typedef struct QuadrantPlantConfig {
   const char *record;
   // Rate of the thread, Hz.
   int rate;
+  // Lag of amplifiers in velocity mode, us; 0 for torque mode.
+  int drive_lag_us;
   // Seed of the noise.
   int seed;
   // Longest record, ticks.

@@ -15,6 +15,8 @@ static char *record = "";
 RTAPI_MP_STRING(record, "file for the record of command and true position");
 static int rate = 1000;
 RTAPI_MP_INT(rate, "rate of the thread, Hz");
+static int drive_lag_us = 0;
+RTAPI_MP_INT(drive_lag_us, "lag of amplifiers in velocity mode, us; 0: torque mode");
 static int seed = 1;
 RTAPI_MP_INT(seed, "seed of the noise");
 static int room = 400000;
@@ -65,7 +67,7 @@ static void write_voltages(void *arg, long period)
 int rtapi_app_main(void)
 {
     struct QuadrantPlantConfig config = {
-        .file = file, .record = record, .rate = rate, .seed = seed, .room = room,
+        .file = file, .record = record, .rate = rate, .drive_lag_us = drive_lag_us, .seed = seed, .room = room,
     };
     int n, r;
 

@@ -52,13 +52,15 @@ pub struct QuadrantPlantConfig {
     pub record: *const c_char,
     /// Rate of the thread, Hz.
     pub rate: c_int,
+    /// Lag of amplifiers in velocity mode, us; 0 for torque mode.
+    pub drive_lag_us: c_int,
     /// Seed of the noise.
     pub seed: c_int,
     /// Longest record, ticks.
     pub room: c_int,
 }
 
-/// A text parameter; an empty one is none.
+/// A text parameter; `none` or an empty one is none.
 ///
 /// # Safety
 /// Null, or a text that ends with a zero and outlives the result.
@@ -69,7 +71,7 @@ unsafe fn text<'a>(pointer: *const c_char) -> io::Result<Option<&'a str>> {
     // SAFETY: as the caller says.
     let text = unsafe { CStr::from_ptr(pointer) };
     let text = text.to_str().map_err(io::Error::other)?;
-    Ok((!text.is_empty()).then_some(text))
+    Ok((!matches!(text, "" | "none")).then_some(text))
 }
 
 /// The choice of a parameter: the first without one.
@@ -180,7 +182,7 @@ pub unsafe extern "C" fn quadrant_plant_start(config: &QuadrantPlantConfig) -> *
     started("quadrant_plant", || {
         // SAFETY: as the caller says; nothing of it is kept.
         let text = |pointer| unsafe { text(pointer) };
-        let truth = match text(config.file)? {
+        let mut truth = match text(config.file)? {
             Some(path) => {
                 StageFile::read(Path::new(path))
                     .map_err(io::Error::other)?
@@ -193,6 +195,10 @@ pub unsafe extern "C" fn quadrant_plant_start(config: &QuadrantPlantConfig) -> *
                 "rate={}: give the thread's rate, Hz",
                 config.rate
             )));
+        }
+        if config.drive_lag_us > 0 {
+            let lag_s = 1e-6 * f64::from(config.drive_lag_us);
+            truth = truth.in_velocity_mode(lag_s);
         }
         Ok(Plant::new(
             &truth,

@@ -1,6 +1,8 @@
 //! `quadrant new`: a settings file for a machine that nobody has commissioned.
 
 mod ask;
+mod from_linuxcnc;
+mod hal_files;
 mod presets;
 
 use std::path::{Path, PathBuf};
@@ -32,6 +34,10 @@ pub(super) struct Arguments {
     /// defaults, without a law.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "x")]
     axis: Vec<Axis>,
+    /// Take the axes, their scales, limits and gains, and the control rate from a configuration of LinuxCNC.
+    #[arg(long, value_name = "INI", conflicts_with_all = ["axis", "scale", "lead_mm", "amplifier", "full_scale_v", "output_limit_v",
+        "max_velocity", "max_acceleration", "travel", "rate"])]
+    from_linuxcnc: Option<PathBuf>,
     /// A usual encoder, by name: rotary-2500 has 2500 lines in a turn of the screw, linear-1um is a scale of 1 um a count.
     #[arg(long, value_name = "NAME", group = "scale")]
     encoder: Option<Encoder>,
@@ -257,22 +263,43 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if path.exists() && !arguments.overwrite {
         bail!("{shown} is there: give another file, or --overwrite");
     }
+    if let Some(ini) = &arguments.from_linuxcnc {
+        return convert(ini, path);
+    }
     let axes: Vec<AxisName> = arguments.axis.iter().map(|&axis| axis.into()).collect();
     let mut questions = Questions::new();
     let machine = arguments.machine(&mut questions)?;
-    let mut file = SettingsFile::new(machine.stage(&axes));
-    for axis in &axes {
+    write(machine.stage(&axes), &axes, path)?;
+    if let Some(taken) = questions.taken() {
+        warn!("not given, so the defaults: {taken}");
+    }
+    say!("{}", next(&machine, &axes, path));
+    Ok(())
+}
+
+/// Writes the settings of these axes.
+fn write(stage: StageSettings, axes: &[AxisName], path: &Path) -> anyhow::Result<()> {
+    let mut file = SettingsFile::new(stage);
+    for axis in axes {
         let sets = ["encoder", "amplifier", "limits"];
         file.add_provenance(&command_line(), axis.as_str(), Vec::new(), &sets);
     }
     let text = file
         .sparse_text(path)
         .context("the firmware would refuse these settings; nothing was written")?;
-    whole::write(path, text).with_context(|| format!("{shown} cannot be written"))?;
-    if let Some(taken) = questions.taken() {
-        warn!("not given, so the defaults: {taken}");
-    }
-    say!("{}", next(&machine, &axes, path));
+    whole::write(path, text).with_context(|| format!("{} cannot be written", path.display()))
+}
+
+/// Writes the settings of a configuration of LinuxCNC, and prints where each was found.
+fn convert(ini: &Path, path: &Path) -> anyhow::Result<()> {
+    let taken = from_linuxcnc::read(ini)?;
+    say!("{}", taken.lines.join("\n"));
+    write(taken.stage, &taken.axes, path)?;
+    let shown = path.display();
+    say!(
+        "\n{shown}: not commissioned. Next: `loadrt quadrant defaults={shown}`, and `quadrant commission --machine tcp:127.0.0.1:7711 --axis {}`",
+        taken.axes[0]
+    );
     Ok(())
 }
 

@@ -16,6 +16,7 @@ mod identify_commands;
 mod interrupted;
 mod kept_settings;
 mod new;
+mod new_from_linuxcnc;
 mod own_stage;
 mod part_program;
 mod plot;

@@ -10,7 +10,9 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::delay::Delay;
-use super::{AxisParameters, Backlash, Body, Drive, EncoderSide, Forcing, Presliding};
+use super::{
+    AxisParameters, Backlash, Body, Drive, EncoderSide, Forcing, Presliding, VelocityDrive,
+};
 
 /// Steps of the integration in a control period.
 pub const SUBSTEPS: usize = 4;
@@ -18,8 +20,10 @@ pub const SUBSTEPS: usize = 4;
 /// A control period of an axis: what stays the same in it, and the motion, which the steps of the integration keep in registers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Period {
-    /// Output of the amplifier after the plant's delay, V, in each step.
+    /// Output of the amplifier after the plant's delay, V, in each step; the command of one in velocity mode.
     driven_v: [f64; SUBSTEPS],
+    /// The amplifier is enabled.
+    enabled: bool,
     /// Load, ripple, cogging and gravity, V at the amplifier's input.
     external_v: f64,
     /// Friction where the axis is over its mean.
@@ -39,6 +43,8 @@ struct Moving {
     presliding_v: f64,
     /// Viscous friction of the last step, V s/mm.
     viscous_v_s_per_mm: f64,
+    /// Integral of an amplifier's own velocity loop, V.
+    drive_integral_v: f64,
 }
 
 /// Damping of an axis in one sense of motion.
@@ -196,6 +202,7 @@ impl SimulatedAxis {
         };
         Period {
             driven_v: self.delay.pass(driven),
+            enabled,
             external_v: external,
             friction_factor: imperfections.friction_factor(position_mm),
             moving: self.moving,
@@ -205,9 +212,13 @@ impl SimulatedAxis {
     /// One step of the integration.
     #[inline(always)]
     pub(super) fn substep(&mut self, period: &mut Period, step: usize) {
-        let driven_v = period.driven_v[step];
+        let mut driven_v = period.driven_v[step];
         let external_v = period.external_v;
         let moving = &mut period.moving;
+        if let Some(drive) = &self.truth.velocity_drive {
+            cold_path();
+            driven_v = self.velocity_loop(drive, moving, driven_v, period.enabled);
+        }
         let damping = self.damping.of(Direction::of(moving.velocity_mm_s));
         let displacement = match self.truth.drive {
             Drive::RackAndPinion(gap) => {
@@ -231,6 +242,26 @@ impl SimulatedAxis {
     #[inline(always)]
     pub(super) fn end(&mut self, period: &Period) {
         self.moving = period.moving;
+    }
+
+    /// The motor's force by an amplifier in velocity mode, V: none while it is disabled.
+    fn velocity_loop(
+        &self,
+        drive: &VelocityDrive,
+        moving: &mut Moving,
+        command_v: f64,
+        enabled: bool,
+    ) -> f64 {
+        if !enabled {
+            moving.drive_integral_v = 0.0;
+            return 0.0;
+        }
+        let velocity_mm_s = match self.truth.drive {
+            Drive::RackAndPinion(_) => moving.motor.velocity_mm_s,
+            Drive::BallScrew | Drive::Direct(_) => moving.velocity_mm_s,
+        };
+        let integral_v = &mut moving.drive_integral_v;
+        drive.step(integral_v, command_v, velocity_mm_s, self.step_s)
     }
 
     /// Moves motor and table as one; the displacement, mm.

@@ -14,15 +14,17 @@ mod parameters;
 mod stage;
 mod transmission;
 mod variation;
+mod velocity_drive;
 
 pub use axis::{SUBSTEPS, SimulatedAxis};
 pub use drive::{Backlash, Cogging, Drive, EncoderSide};
 pub use friction::Presliding;
 pub use marks::{MarkParameters, Marks};
 pub use parameters::{
-    AxisParameters, FrictionParameters, Imperfections, PLANT_ELEMENTS, StageParameters,
-    virgin_curve_elements,
+    AxisParameters, DRIVE_MM_S_PER_V, FrictionParameters, Imperfections, PLANT_ELEMENTS,
+    StageParameters, virgin_curve_elements,
 };
 pub use stage::SimulatedStage;
 pub use transmission::{Body, Forcing};
 pub use variation::NEWTONS_PER_VOLT;
+pub use velocity_drive::VelocityDrive;

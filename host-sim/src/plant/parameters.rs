@@ -12,10 +12,13 @@ use quadrant_law::friction::smoothed_gms::SmoothedGmsParameters;
 use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant_settings::presets::{X_PLANT, Y_PLANT, Z_PLANT};
 
-use super::Drive;
+use super::{Drive, VelocityDrive};
 
 /// GMS elements of the simulated axes' friction.
 pub const PLANT_ELEMENTS: usize = 10;
+
+/// Velocity for a volt of the simulated stage's amplifiers in velocity mode, mm/(V s).
+pub const DRIVE_MM_S_PER_V: f64 = 25.0;
 
 /// Friction model of a simulated axis. The levels are those of its static friction, the elements those of its GMS
 /// parameters.
@@ -55,6 +58,8 @@ pub struct AxisParameters {
     pub imperfections: Imperfections,
     /// Drive train between motor and table.
     pub drive: Drive,
+    /// The amplifier's own velocity loop; `None` in torque mode, where a voltage is a force.
+    pub velocity_drive: Option<VelocityDrive>,
 }
 
 /// Imperfections of a real axis that its model leaves out; all zero for an ideal one.
@@ -186,6 +191,7 @@ fn axis(character: &Character) -> AxisParameters {
         full_scale_v: 10.0,
         imperfections: character.imperfections,
         drive: Drive::BallScrew,
+        velocity_drive: None,
     }
 }
 
@@ -234,6 +240,20 @@ impl StageParameters {
                 }),
             ],
         }
+    }
+
+    /// The same stage behind amplifiers in velocity mode: the velocity follows with a lag, s, and is [`DRIVE_MM_S_PER_V`] for a volt.
+    #[must_use]
+    pub fn in_velocity_mode(mut self, lag_s: f64) -> Self {
+        for axis in &mut self.axes {
+            axis.velocity_drive = Some(VelocityDrive::with_lag(
+                lag_s,
+                DRIVE_MM_S_PER_V,
+                axis.full_scale_v,
+                axis.gain_mm_per_v_s2,
+            ));
+        }
+        self
     }
 
     /// The same stage without the imperfections that no model of the control law knows.

@@ -63,6 +63,8 @@ numbers! {
     mass_kg: 0.01..=100_000.0, 10.0, "Moving mass, the rotor and the screw reduced to it.";
     force_n_per_v: 0.01..=1_000_000.0, 693.9, "Force for a volt at the amplifier's input.";
     full_scale_v: 0.1..=20.0, 10.0, "Voltage of the converter's largest code; the amplifier saturates there.";
+    drive_lag_ms: 0.0..=20.0, 0.0, "Lag of the amplifier's own velocity loop; 0 in torque mode, where a voltage is a force.";
+    drive_velocity_mm_s_per_v: 0.1..=1000.0, 25.0, "Velocity for a volt of an amplifier in velocity mode.";
     delay_ms: 0.0..=20.0, 1.2, "Delay from the converter's output to the force.";
     coulomb_n: 0.01..=1_000_000.0, 83.268, "Friction while it slides fast.";
     breakaway_n: 0.01..=1_000_000.0, 104.085, "Friction at which it breaks away; without it 1.25 times coulomb_n.";

@@ -23,7 +23,7 @@ pub use self::fields::{FIELDS, Field};
 use self::fields::{Numbers, Written};
 use crate::plant::{
     AxisParameters, Backlash, Drive, EncoderSide, FrictionParameters, Imperfections,
-    MarkParameters, PLANT_ELEMENTS, StageParameters, virgin_curve_elements,
+    MarkParameters, PLANT_ELEMENTS, StageParameters, VelocityDrive, virgin_curve_elements,
 };
 use crate::toml_file::{TomlFileError, text_of};
 
@@ -386,6 +386,14 @@ impl Axis {
                 ..Imperfections::default()
             },
             drive: self.drive(gain_mm_per_v_s2),
+            velocity_drive: (self.numbers.drive_lag_ms > 0.0).then(|| {
+                VelocityDrive::with_lag(
+                    1e-3 * self.numbers.drive_lag_ms,
+                    self.numbers.drive_velocity_mm_s_per_v,
+                    self.numbers.full_scale_v,
+                    gain_mm_per_v_s2,
+                )
+            }),
         }
     }
 

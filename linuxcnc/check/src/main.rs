@@ -12,6 +12,7 @@ use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::learning::LearningSettings;
 use quadrant_settings::StageSettings;
 use quadrant_sim::identified_stage::identified_settings;
+use quadrant_sim::plant::DRIVE_MM_S_PER_V;
 use quadrant_tune::design::with_best_pid;
 
 use self::score::Score;
@@ -21,6 +22,8 @@ use self::session::Session;
 const AT_A_TIME: usize = 8;
 /// Rates of the servo thread, Hz.
 const RATES_HZ: [f64; 2] = [1e3, 4e3];
+/// Lag of amplifiers in velocity mode, us.
+const VELOCITY_LAG_US: u32 = 2000;
 /// Seeds of the stage's noise.
 const SEEDS: [u32; 3] = [1, 2, 3];
 
@@ -57,16 +60,19 @@ struct Loop {
     words: &'static str,
     file: &'static str,
     preview: &'static str,
+    /// Lag of amplifiers in velocity mode, us; 0 for torque mode.
+    drive_lag_us: u32,
     settings: fn(&StageSettings) -> StageSettings,
 }
 
 /// The loops that are compared; the first is the one that the others are compared with.
-const LOOPS: [Loop; 5] = [
+const LOOPS: [Loop; 6] = [
     Loop {
         letter: "a",
         words: "LinuxCNC's pid",
         file: "pid.hal",
         preview: "extrapolate",
+        drive_lag_us: 0,
         settings: Clone::clone,
     },
     Loop {
@@ -74,6 +80,7 @@ const LOOPS: [Loop; 5] = [
         words: "ours, no friction fed forward",
         file: "quadrant.hal",
         preview: "extrapolate",
+        drive_lag_us: 0,
         settings: without_friction,
     },
     Loop {
@@ -81,6 +88,7 @@ const LOOPS: [Loop; 5] = [
         words: "ours",
         file: "quadrant.hal",
         preview: "extrapolate",
+        drive_lag_us: 0,
         settings: Clone::clone,
     },
     Loop {
@@ -88,13 +96,23 @@ const LOOPS: [Loop; 5] = [
         words: "pid + our feedforward",
         file: "feedforward.hal",
         preview: "extrapolate",
+        drive_lag_us: 0,
         settings: for_pid,
     },
     Loop {
         letter: "e",
+        words: "pid, amplifiers in velocity mode",
+        file: "pid.hal",
+        preview: "extrapolate",
+        drive_lag_us: VELOCITY_LAG_US,
+        settings: behind_velocity_loops,
+    },
+    Loop {
+        letter: "f",
         words: "ours, reference delayed",
         file: "quadrant.hal",
         preview: "delay",
+        drive_lag_us: 0,
         settings: Clone::clone,
     },
 ];
@@ -103,6 +121,20 @@ fn without_friction(settings: &StageSettings) -> StageSettings {
     let mut settings = settings.clone();
     for axis in &mut settings.axes {
         axis.feedforward.kind = FeedforwardKind::None;
+    }
+    settings
+}
+
+/// Settings of the linear model behind amplifiers in velocity mode, an integrator with a lag.
+fn behind_velocity_loops(settings: &StageSettings) -> StageSettings {
+    let mut settings = settings.clone();
+    for plant in settings
+        .axes
+        .iter_mut()
+        .filter_map(|axis| axis.plant.as_mut())
+    {
+        plant.damping_per_s = 1e6 / f64::from(VELOCITY_LAG_US);
+        plant.gain_mm_per_v_s2 = DRIVE_MM_S_PER_V * plant.damping_per_s;
     }
     settings
 }
@@ -160,8 +192,9 @@ fn check(folder: &Path, with_delay: bool, again: bool) -> Result<()> {
                     name: format!("{rate_hz}-{}-{seed}", way.letter),
                     loops: way.file,
                     settings: (way.settings)(&settings),
-                    gains: pid_gains(&settings),
+                    gains: pid_gains(&(way.settings)(&settings)),
                     preview: way.preview,
+                    drive_lag_us: way.drive_lag_us,
                     seed,
                 });
             }
@@ -250,6 +283,7 @@ fn run() -> Result<()> {
         gains: pid_gains(&settings),
         settings,
         preview: "extrapolate",
+        drive_lag_us: 0,
         seed: SEEDS[0],
     };
     session::write(&session, &folder, "axis")?;

@@ -30,6 +30,8 @@ pub(crate) struct Session {
     pub(crate) gains: [[f64; 5]; 3],
     /// `extrapolate` or `delay`.
     pub(crate) preview: &'static str,
+    /// Lag of amplifiers in velocity mode, us; 0 for torque mode.
+    pub(crate) drive_lag_us: u32,
     /// Seed of the stage's noise.
     pub(crate) seed: u32,
 }
@@ -64,6 +66,7 @@ pub(crate) fn write(session: &Session, folder: &Path, display: &str) -> Result<(
         ("QUADRANT", "PREVIEW", session.preview.to_owned()),
         ("PLANT", "RATE", rate),
         ("PLANT", "SEED", seed),
+        ("PLANT", "DRIVE_LAG_US", session.drive_lag_us.to_string()),
         (
             "PLANT",
             "RECORD",

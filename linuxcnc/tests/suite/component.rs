@@ -106,6 +106,7 @@ impl Component {
             file: ptr::null(),
             record: ptr::null(),
             rate: RATE_HZ as i32,
+            drive_lag_us: 0,
             seed: 1,
             room: 0,
         };

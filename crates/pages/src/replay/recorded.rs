@@ -202,6 +202,7 @@ fn emps_axis() -> Result<Axis, ReplayError> {
             ..Imperfections::default()
         },
         drive: Drive::BallScrew,
+        velocity_drive: None,
     };
     let mut best = settings.clone();
     set_best_pid(&mut best, StageSettings::simulated().rate_hz)?;

@@ -10,6 +10,7 @@ use super::linear_model::{HOME_MM, Linear, linear_model};
 use super::models::{self, Measurements, Models};
 use super::quiet_pid;
 use super::rest::Knock;
+use super::velocity_mode;
 use super::verify::{Verification, VerifyError, verify};
 use crate::identify::motor_constant::{self, MotorConstantSettings};
 use crate::identify::static_friction::{
@@ -97,6 +98,7 @@ fn guarded(
         report(watch, step, share);
     })?;
 
+    velocity_mode::refuse(&plant.plant, &response)?;
     step += 1;
     let mut settings = base.clone();
     settings.plant = Some(plant.plant);

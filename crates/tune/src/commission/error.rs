@@ -32,6 +32,18 @@ pub enum CommissionError {
     /// The linear model was not found.
     #[error("linear model: {0}")]
     Plant(#[from] PlantError),
+    /// The amplifier has a velocity loop of its own.
+    #[error(
+        "the amplifier is in velocity mode: a volt commands {velocity_mm_s_per_v:.1} mm/s, with a lag of some {lag_ms:.0} ms, and its own loop \
+         takes up the friction, so that none is left to measure and to feed forward: switch the amplifier to torque (current) mode, and \
+         commission again; or keep your present loop, and feed {:.4} V s/mm of velocity forward", 1.0 / velocity_mm_s_per_v
+    )]
+    VelocityMode {
+        /// Velocity for a volt, mm/(V s).
+        velocity_mm_s_per_v: f64,
+        /// Time constant with which the velocity follows, ms; rough.
+        lag_ms: f64,
+    },
     /// The PID was not found.
     #[error("PID: {0}")]
     Pid(#[from] DesignError),

@@ -19,6 +19,7 @@ mod plan;
 mod quiet_pid;
 mod rest;
 mod ringing;
+mod velocity_mode;
 pub mod verify;
 
 pub use chain::{Watch, commission};

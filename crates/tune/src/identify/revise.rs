@@ -179,6 +179,7 @@ pub fn candidate(
         full_scale_v: settings.amplifier.full_scale_v,
         imperfections: Imperfections::default(),
         drive: Drive::BallScrew,
+        velocity_drive: None,
     }
 }
 

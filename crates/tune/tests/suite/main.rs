@@ -24,3 +24,4 @@ mod record_experiment;
 mod record_refusals;
 mod record_trace;
 mod test_axis;
+mod velocity_drive;
