@@ -117,6 +117,11 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
         self.plan[axis as usize] = motion;
     }
 
+    /// True if the plan starts in the next tick, unless the law refuses.
+    pub(crate) fn starts_plan(&self) -> bool {
+        matches!(self.command, Some(Command::Run | Command::StartMove(_)))
+    }
+
     /// Sets the speed of the spindle.
     pub fn set_spindle_speed(&mut self, speed: SpindleSpeed) {
         self.state.set_spindle_speed(speed);
