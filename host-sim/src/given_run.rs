@@ -2,6 +2,8 @@
 //!
 //! One axis alone, or the three of a stage. A run is advanced some ticks at a time, so that a caller can look elsewhere between.
 
+use std::sync::Arc;
+
 use quadrant_law::axes::AxisName;
 use quadrant_law::axis::AxisState;
 use quadrant_law::axis::telemetry::LimitedBy;
@@ -18,10 +20,10 @@ use crate::law_machine::{LawMachine, TickInput};
 use crate::plant::{SimulatedAxis, SimulatedStage, StageParameters};
 use crate::run::RunError;
 
-/// Reference of an axis, a sample a control period, from where the axis stands.
+/// Reference of an axis, a sample a control period, from where the axis stands. Copies share the samples.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GivenReference {
-    samples: Vec<ReferenceSample<f32>>,
+    samples: Arc<[ReferenceSample<f32>]>,
 }
 
 impl GivenReference {
@@ -65,7 +67,9 @@ impl GivenReference {
         while samples.len() < most_ticks && !motion.finished(&state) {
             samples.push(motion.step(&mut state));
         }
-        Self { samples }
+        Self {
+            samples: samples.into(),
+        }
     }
 
     /// Its samples.
@@ -332,8 +336,7 @@ impl GivenRun {
                 self.origins[index] = self.machine.state().axes()[index].reference();
             }
             sample.position = sample.position + self.origins[index];
-            self.machine
-                .set_motion(AxisName::ALL[index], Motion::Given(sample));
+            self.machine.lead(AxisName::ALL[index], sample);
         }
     }
 

@@ -35,3 +35,7 @@ class Fault(RuntimeError):
         where = self.axis or "the stage"
         when = "" if self.tick is None else f" at tick {self.tick}"
         return f"fault {self.code} ({self.name}) on {where}{when}: {self.cause}; {self.remedy}"
+
+
+class CommissioningError(RuntimeError):
+    """A commissioning that ended early, with the step, the reason and what would help."""

@@ -51,7 +51,7 @@ class Result:
     @property
     def measured_mm(self) -> Floats:
         """Position by the encoder, mm."""
-        return self.counts * self.resolution_mm
+        return self.counts.astype(float) * self.resolution_mm
 
     @property
     def error_mm(self) -> Floats:
@@ -61,7 +61,7 @@ class Result:
     @property
     def time_s(self) -> Floats:
         """Time from the first row, s."""
-        return np.arange(len(self.word)) / self.rate_hz
+        return np.arange(len(self.word), dtype=float) / self.rate_hz
 
     @property
     def rms_error_mm(self) -> float:
@@ -86,7 +86,8 @@ class Result:
         """Returns a data frame with a column for each signal, indexed by the time in s."""
         import pandas
 
-        return pandas.DataFrame(self.to_dict()).set_index("t_s")
+        frame: pandas.DataFrame = pandas.DataFrame(self.to_dict()).set_index("t_s")
+        return frame
 
     def plot(self, axes: Axes | None = None, label: str | None = None) -> Axes:
         """Plots the error in um over the time in s; returns the axes of matplotlib."""
@@ -125,7 +126,7 @@ class SimulationResult(Result):
     @property
     def measured_mm(self) -> Floats:
         """Position by the encoder, mm."""
-        return self.counts * self.resolution_mm + self.first_mm
+        return self.counts.astype(float) * self.resolution_mm + self.first_mm
 
     @property
     def error_mm(self) -> Floats:

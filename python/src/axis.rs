@@ -117,8 +117,7 @@ impl Axis {
             velocity: velocity.unwrap_or(difference) as f32,
             acceleration: acceleration.unwrap_or(second) as f32,
         };
-        self.tick(&ahead, counts)
-            .map_err(|code| self.fault(code))
+        self.tick(&ahead, counts).map_err(|code| self.fault(code))
     }
 
     /// Control periods of arrays; the signals by name.

@@ -18,27 +18,41 @@ pub(crate) fn value(error: impl Display) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// A `ValueError` in the words of an error and its sources; an `OSError` where a file cannot be read or written.
-pub(crate) fn of(error: impl Error + 'static) -> PyErr {
+/// The words of an error and of its sources.
+pub(crate) fn words(error: &(dyn Error + 'static)) -> String {
     let mut words = error.to_string();
-    let mut is_io = false;
-    let mut source: Option<&(dyn Error + 'static)> = Some(&error);
+    let mut source = error.source();
     while let Some(cause) = source {
-        is_io |= cause.is::<std::io::Error>();
-        if matches!(cause.downcast_ref(), Some(TomlFileError::Io { .. })) {
-            is_io = true;
-        }
         let text = cause.to_string();
         if !words.contains(&text) {
             words = format!("{words}: {text}");
         }
         source = cause.source();
     }
-    if is_io {
-        PyOSError::new_err(words)
-    } else {
-        PyValueError::new_err(words)
+    words
+}
+
+/// A `ValueError` in the words of an error and its sources; an `OSError` where a file cannot be read or written.
+pub(crate) fn of(error: impl Error + 'static) -> PyErr {
+    let text = words(&error);
+    let mut source: Option<&(dyn Error + 'static)> = Some(&error);
+    while let Some(cause) = source {
+        if cause.is::<std::io::Error>()
+            || matches!(cause.downcast_ref(), Some(TomlFileError::Io { .. }))
+        {
+            return PyOSError::new_err(text);
+        }
+        source = cause.source();
     }
+    PyValueError::new_err(text)
+}
+
+/// An exception of the package by its class.
+pub(crate) fn named(class: &'static str, text: String) -> PyErr {
+    Python::attach(|py| {
+        let made = || py.import(MODULE)?.getattr(class)?.call1((text,));
+        made().map_or_else(|error| error, PyErr::from_value)
+    })
 }
 
 /// A `quadrant.Fault`.
@@ -48,16 +62,24 @@ pub(crate) fn fault(fault: Fault) -> PyErr {
 
 /// A `quadrant.Fault` of its parts.
 pub(crate) fn fault_of(code: FaultCode, axis: Option<AxisName>, tick: Option<u32>) -> PyErr {
+    fault_in_words(
+        (code.number(), code.name()),
+        axis,
+        tick,
+        (code.cause(), code.remedy()),
+    )
+}
+
+/// A `quadrant.Fault` in the words of a machine.
+pub(crate) fn fault_in_words(
+    (code, name): (u8, &str),
+    axis: Option<AxisName>,
+    tick: Option<u32>,
+    (cause, remedy): (&str, &str),
+) -> PyErr {
     Python::attach(|py| {
         let made = || {
-            let arguments = (
-                code.number(),
-                code.name(),
-                axis.map(AxisName::as_str),
-                tick,
-                code.cause(),
-                code.remedy(),
-            );
+            let arguments = (code, name, axis.map(AxisName::as_str), tick, cause, remedy);
             py.import(MODULE)?.getattr("Fault")?.call1(arguments)
         };
         made().map_or_else(|error| error, PyErr::from_value)

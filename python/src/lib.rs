@@ -3,8 +3,15 @@
 
 mod arrays;
 mod axis;
+mod commission;
+mod design;
 mod errors;
+mod friction;
+mod identify;
 mod interrupt;
+mod json;
+mod machine;
+mod records;
 mod references;
 mod settings;
 mod simulate;
@@ -24,5 +31,28 @@ fn quadrant(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<stage::SimulatedAxis>()?;
     module.add_function(wrap_pyfunction!(simulate::simulate, module)?)?;
     module.add_function(wrap_pyfunction!(simulate::simulate_many, module)?)?;
+    module.add_class::<design::DesignProcess>()?;
+    module.add_class::<identify::MotionModels>()?;
+    module.add_class::<machine::Session>()?;
+    module.add_function(wrap_pyfunction!(commission::commission_simulated, module)?)?;
+    module.add_function(wrap_pyfunction!(design::design_pid, module)?)?;
+    module.add_function(wrap_pyfunction!(design::margins, module)?)?;
+    module.add_function(wrap_pyfunction!(design::load_error, module)?)?;
+    module.add_function(wrap_pyfunction!(design::open_loop, module)?)?;
+    module.add_function(wrap_pyfunction!(design::popov, module)?)?;
+    module.add_function(wrap_pyfunction!(design::npid, module)?)?;
+    module.add_function(wrap_pyfunction!(friction::friction_static, module)?)?;
+    module.add_function(wrap_pyfunction!(friction::friction_force, module)?)?;
+    module.add_function(wrap_pyfunction!(friction::virgin_curve, module)?)?;
+    module.add_function(wrap_pyfunction!(friction::fit_hysteresis, module)?)?;
+    module.add_function(wrap_pyfunction!(friction::fit_runs, module)?)?;
+    module.add_function(wrap_pyfunction!(friction::fit_single_state, module)?)?;
+    module.add_function(wrap_pyfunction!(identify::frf, module)?)?;
+    module.add_function(wrap_pyfunction!(identify::fit_tf, module)?)?;
+    module.add_function(wrap_pyfunction!(identify::plant_response, module)?)?;
+    module.add_function(wrap_pyfunction!(identify::motor_constant, module)?)?;
+    module.add_function(wrap_pyfunction!(identify::fit_motion, module)?)?;
+    module.add_function(wrap_pyfunction!(records::read_recording, module)?)?;
+    module.add_function(wrap_pyfunction!(records::write_recording, module)?)?;
     Ok(())
 }

@@ -148,6 +148,10 @@ impl Motion {
 }
 
 impl Motion {
+    pub(crate) fn settings(&self) -> &MotionSettings {
+        &self.settings
+    }
+
     fn given(&self, scale: MotionScale) -> GivenReference {
         GivenReference::of_motion(&self.settings, scale, (MOST_S * scale.rate_hz) as usize)
     }

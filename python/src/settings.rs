@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
-use pythonize::{depythonize, pythonize};
 use quadrant_law::axes::AxisName;
 use quadrant_settings::StageSettings;
 use quadrant_settings::tree::{TreeError, expand};
@@ -13,7 +12,7 @@ use quadrant_sim::setting_value::{meant, short};
 use quadrant_sim::settings_file::SettingsFile;
 use serde_json::Value;
 
-use crate::errors;
+use crate::{errors, json};
 
 /// Room for every value as JSON.
 const JSON_BYTES: usize = 2048;
@@ -56,7 +55,9 @@ pub(crate) fn axis_name(name: &str) -> PyResult<AxisName> {
     AxisName::ALL
         .into_iter()
         .find(|axis| axis.as_str() == name)
-        .ok_or_else(|| PyValueError::new_err(format!("axis = {name:?}: it is \"x\", \"y\" or \"z\"")))
+        .ok_or_else(|| {
+            PyValueError::new_err(format!("axis = {name:?}: it is \"x\", \"y\" or \"z\""))
+        })
 }
 
 /// The name that a text has in messages instead of a path.
@@ -80,21 +81,6 @@ fn path_error(path: &str, error: TreeError) -> PyErr {
             None => format!("there is no setting {path}; settings.paths() lists them"),
         }),
     }
-}
-
-/// An object of Python as TOML has it: `None` is left out.
-fn without_none(value: Value) -> Option<Value> {
-    Some(match value {
-        Value::Null => return None,
-        Value::Array(items) => Value::Array(items.into_iter().filter_map(without_none).collect()),
-        Value::Object(fields) => Value::Object(
-            fields
-                .into_iter()
-                .filter_map(|(key, value)| Some((key, without_none(value)?)))
-                .collect(),
-        ),
-        other => other,
-    })
 }
 
 #[pymethods]
@@ -136,8 +122,10 @@ impl Settings {
 
     /// Returns all settings as a dictionary of dictionaries; parts that are left out are not in it.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let value = serde_json::to_value(&self.file.stage).map_err(errors::value)?;
-        Ok(pythonize(py, &without_none(value))?)
+        // As TOML, which has no parts that are left out.
+        let table = toml::Table::try_from(&self.file.stage).map_err(errors::value)?;
+        let json = serde_json::to_string(&table).map_err(errors::value)?;
+        json::load(py, &json)
     }
 
     /// Returns the text of a settings file, with the settings that differ from the defaults alone.
@@ -178,23 +166,20 @@ impl Settings {
 
     fn __getitem__<'py>(&self, py: Python<'py>, path: &str) -> PyResult<Bound<'py, PyAny>> {
         let full = expand(path).ok_or_else(|| path_error(path, TreeError::NotFound))?;
-        let mut json = [0; JSON_BYTES];
+        let mut bytes = [0; JSON_BYTES];
         let length = self
             .file
             .stage
-            .get_json(&full, &mut json)
+            .get_json(&full, &mut bytes)
             .map_err(|error| path_error(path, error))?;
-        let value: Value = serde_json::from_slice(&json[..length]).map_err(errors::value)?;
-        Ok(pythonize(py, &value)?)
+        json::load(py, &String::from_utf8_lossy(&bytes[..length]))
     }
 
     fn __setitem__(&mut self, path: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
         let full = expand(path).ok_or_else(|| path_error(path, TreeError::NotFound))?;
-        let value: Value = depythonize(value)?;
-        let json = serde_json::to_vec(&value).map_err(errors::value)?;
         self.file
             .stage
-            .set_json(&full, &json)
+            .set_json(&full, json::dump(value)?.as_bytes())
             .map_err(|error| path_error(path, error))?;
         Ok(())
     }
@@ -226,10 +211,7 @@ impl Settings {
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
         let parse = py.get_type::<Self>().getattr("parse")?;
-        let text = self
-            .file
-            .text(named("the settings"))
-            .map_err(errors::of)?;
+        let text = self.file.text(named("the settings")).map_err(errors::of)?;
         Ok((parse, (text,)))
     }
 
@@ -256,10 +238,8 @@ impl Settings {
 
 impl Settings {
     fn from_dict_inner(values: &Bound<'_, PyDict>) -> PyResult<Self> {
-        let value: Value = depythonize(values.as_any())?;
-        let value = without_none(value).unwrap_or(Value::Object(serde_json::Map::new()));
-        let wrapped = serde_json::json!({ "stage": value });
-        let table = toml::Table::try_from(wrapped).map_err(errors::value)?;
+        let mut table = toml::Table::new();
+        table.insert("stage".to_owned(), json::toml_of(values.as_any())?);
         let text = toml::to_string(&table).map_err(errors::value)?;
         let file = SettingsFile::parse(&text, named("the dictionary")).map_err(errors::of)?;
         Ok(Self { file })

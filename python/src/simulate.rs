@@ -95,7 +95,8 @@ fn stage_run(
     if longest == 0 {
         return Err(PyValueError::new_err("no axis has a reference"));
     }
-    for (name, (reference, length)) in AxisName::ALL.iter().zip(references.iter_mut().zip(lengths)) {
+    for (name, (reference, length)) in AxisName::ALL.iter().zip(references.iter_mut().zip(lengths))
+    {
         if length == 0 {
             let scale = settings.motion_scale(*name as usize);
             *reference = GivenReference::through(&vec![0.0; longest], scale);
@@ -143,7 +144,9 @@ fn signals(py: Python<'_>, trace: GivenTrace, first_mm: f64) -> PyResult<Bound<'
 /// Reference minus true position, mm.
 fn error_mm(trace: &GivenTrace) -> Vec<f64> {
     let pairs = trace.reference_mm.iter().zip(&trace.position_mm);
-    pairs.map(|(reference, position)| reference - position).collect()
+    pairs
+        .map(|(reference, position)| reference - position)
+        .collect()
 }
 
 /// A signal that can be kept of many runs.
@@ -207,7 +210,9 @@ pub(crate) fn simulate_many<'py>(
             let found = Kept::ALL.into_iter().find(|(name, _)| name == asked);
             let names = Kept::ALL.map(|(name, _)| name).join(", ");
             found.ok_or_else(|| {
-                PyKeyError::new_err(format!("keep: there is no signal {asked}; there are {names}"))
+                PyKeyError::new_err(format!(
+                    "keep: there is no signal {asked}; there are {names}"
+                ))
             })
         })
         .collect::<PyResult<_>>()?;
@@ -291,7 +296,10 @@ pub(crate) fn simulate_many<'py>(
         found.set_item(*name, array)?;
     }
     let of = |value: fn(&Outcome) -> f64| -> Vec<f64> { outcomes.iter().map(value).collect() };
-    found.set_item("largest_error_mm", of(|run| run.largest_mm).into_pyarray(py))?;
+    found.set_item(
+        "largest_error_mm",
+        of(|run| run.largest_mm).into_pyarray(py),
+    )?;
     found.set_item("rms_error_mm", of(|run| run.rms_mm).into_pyarray(py))?;
     let faults = PyList::empty(py);
     for outcome in &outcomes {

@@ -5,16 +5,15 @@ use std::path::{Path, PathBuf};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
-use pythonize::depythonize;
 use quadrant_law::axes::AxisName;
 use quadrant_law::units::DacCode;
 use quadrant_sim::plant::{AxisParameters, StageParameters};
-use quadrant_sim::stage_file::{FIELDS, StageFile};
+use quadrant_sim::stage_file::{DataSheet, FIELDS, StageFile};
 use quadrant_sim::stage_setup::StageSetup;
-use serde_json::{Map, Value};
+use toml::{Table, Value};
 
-use crate::errors;
 use crate::settings::{Settings, axis_name};
+use crate::{errors, json};
 
 /// A simulated stage of three axes, whose parameters the law does not know.
 ///
@@ -41,6 +40,8 @@ pub(crate) struct Stage {
     /// Text that it was made of; empty for the built-in one.
     text: String,
     pub(crate) setup: StageSetup,
+    /// Data sheets of its axes, where it has them.
+    pub(crate) known: [Option<DataSheet>; 3],
 }
 
 impl Stage {
@@ -52,6 +53,7 @@ impl Stage {
         Self {
             text: String::new(),
             setup: StageSetup::simulated(),
+            known: [None; 3],
         }
     }
 
@@ -63,6 +65,7 @@ impl Stage {
         Ok(Self {
             text,
             setup: StageSetup::of(&file),
+            known: file.known,
         })
     }
 }
@@ -78,26 +81,26 @@ impl Stage {
         z: Option<&Bound<'_, PyDict>>,
         fields: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let object = |dict: Option<&Bound<'_, PyDict>>| -> PyResult<Map<String, Value>> {
+        let object = |dict: Option<&Bound<'_, PyDict>>| -> PyResult<Table> {
             let Some(dict) = dict else {
-                return Ok(Map::new());
+                return Ok(Table::new());
             };
-            match depythonize(dict.as_any())? {
-                Value::Object(fields) => Ok(fields),
+            match json::toml_of(dict.as_any())? {
+                Value::Table(fields) => Ok(fields),
                 _ => Err(PyValueError::new_err("the keys of an axis are names")),
             }
         };
         let all = object(fields)?;
-        let mut axes = Map::new();
+        let mut axes = Table::new();
         for (axis, own) in AxisName::ALL.into_iter().zip([x, y, z]) {
             if own.is_none() && all.is_empty() {
                 continue;
             }
             let mut axis_fields = all.clone();
             axis_fields.extend(object(own)?);
-            axes.insert(axis.as_str().to_owned(), Value::Object(axis_fields));
+            axes.insert(axis.as_str().to_owned(), Value::Table(axis_fields));
         }
-        let text = toml::to_string(&Value::Object(axes)).map_err(errors::value)?;
+        let text = toml::to_string(&axes).map_err(errors::value)?;
         Self::parsed(text, Path::new("Stage"))
     }
 
@@ -198,7 +201,10 @@ impl Stage {
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
-        Ok((py.get_type::<Self>().getattr("parse")?, (self.text.clone(),)))
+        Ok((
+            py.get_type::<Self>().getattr("parse")?,
+            (self.text.clone(),),
+        ))
     }
 
     fn __repr__(&self) -> String {
