@@ -93,9 +93,15 @@ def _commissioned(axis: str, found: dict[str, Any]) -> Commissioned:
     )
 
 
+_last_step = ""
+
+
 def print_progress(step: str, share: float) -> None:
-    """Prints the step and the share that is done, on one line."""
-    print(f"\r{100 * share:3.0f} %  {step:<30}", end="\n" if share >= 1.0 else "", flush=True)
+    """Prints each step, and the share that is done when it begins, on a line."""
+    global _last_step
+    if step != _last_step:
+        _last_step = step
+        print(f"{100 * share:3.0f} %  {step}", flush=True)
 
 
 def commission(
