@@ -155,7 +155,7 @@ def frictions() -> None:
     fit_s, _ = timed(lambda: friction.fit_hysteresis(x, force, 1e-3), 1)
     row("GMS friction over 40 000 samples", "`friction.Gms.force`", model_s, "")
     row("its identification with standard errors", "`friction.fit_hysteresis`", fit_s, "")
-    row("GMS, LuGre, Dahl: models or identification", "python-control, SciPy, SIPPY, nfoursid", None, "")
+    row("GMS, LuGre, Dahl: models or identification", "python-control, SciPy, nfoursid", None, "")
 
 
 def main() -> None:

@@ -14,12 +14,13 @@ from quadrant import friction
 # Your own: recording = quadrant.files.read("slow-sine.csv"), then recording.position_mm, recording.voltage_v, recording.sample_time_s.
 settings = q.Settings.simulated()
 settings["x/feedforward/kind"] = "none"
-settings["x/feedforward/gains/inertia_v_s2_per_mm"] = 0.0
+settings["x/feedback/law"] = "pid"
 stage = q.Stage(ripple_n=0)
-time_s = np.arange(0.0, 24.0, 1e-4)
-reference = 0.15 * np.sin(2 * np.pi * 0.25 * time_s) * np.minimum(1.0, time_s)
+time_s = np.arange(0.0, 45.0, 1e-4)
+reference = 0.3 * np.sin(2 * np.pi * 0.1 * time_s) * np.minimum(1.0, time_s / 5.0)
 run = q.simulate(settings, reference, stage)
-position, voltage, step_s = run.measured_mm[::10], run.output_v[::10], 1e-3
+# A sample each millisecond: the position at its beginning, the mean voltage over it.
+position, voltage, step_s = run.measured_mm[::10], run.output_v.reshape(-1, 10).mean(axis=1), 1e-3
 
 # %%
 fit = friction.fit_hysteresis(position, voltage, step_s, elements=4)

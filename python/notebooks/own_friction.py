@@ -44,8 +44,8 @@ def closed_loop(model, settings: q.Settings, seed: int = 1) -> np.ndarray:
     errors = []
     for k, (x, v, a) in enumerate(zip(positions, velocities, accelerations)):
         word = law.step(x, counts, v, a) + round(model(x, v) / law.volts_per_word)
-        counts = axis.step(word)
         errors.append(1e3 * (positions[max(k - late, 0)] - axis.position_mm))
+        counts = axis.step(word)
     return np.array(errors)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import threading
 from pathlib import Path
@@ -135,3 +136,17 @@ def test_a_file_of_another_program_is_read_by_its_columns_and_units(tmp_path: Pa
         files.read(path, "nonsense")
     with pytest.raises(OSError, match="missing.csv"):
         files.read(tmp_path / "missing.csv")
+
+
+IMAGE = Path(__file__).parents[2] / "target/images/mps2-f32.elf"
+
+
+@pytest.mark.skipif(not IMAGE.exists() or shutil.which("qemu-system-arm") is None, reason="no image, or no QEMU")
+def test_the_image_in_qemu_is_a_machine_too() -> None:
+    with quadrant.Machine(f"emulated:{IMAGE}") as machine:
+        assert machine.identity["board"] == "mps2"
+        machine.load(quadrant.Settings.simulated())
+        machine.enable()
+        machine.run({"x": quadrant.Motion.sine(2.0, 20.0, cycles=0.25, lead_s=0.1)})
+        status = machine.wait()
+        assert status["state"] == "enabled" and abs(status["x"]["position_mm"]) > 0.1

@@ -59,7 +59,8 @@ pub(crate) fn run() -> Result<()> {
             .with_extension("ipynb");
         command::run_quietly(
             command::command(&python)
-                .args(["-m", "jupytext", "--to", "ipynb", "--execute", "--run-path"])
+                .args(["-m", "jupytext", "--to", "ipynb", "--set-kernel", "python3"])
+                .args(["--execute", "--run-path"])
                 .arg(sources.join("notebooks"))
                 .arg("--output")
                 .args([&made, &notebook]),
