@@ -6,7 +6,7 @@ use quadrant_law::axes::{AxisName, PerAxis};
 use quadrant_law::cancelling::SpindleSpeed;
 use quadrant_law::command::Command;
 use quadrant_law::encoder::EncoderReading;
-use quadrant_law::reference::{Motion, Segment};
+use quadrant_law::reference::{Motion, ReferenceSample, Segment};
 use quadrant_law::safety::Switches;
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::{Inputs, Outputs, Plan, Stage, StageState};
@@ -115,6 +115,19 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
     /// Gives an axis of the plan another motion, for [`Command::StartMove`]. It must not be following the plan.
     pub fn set_motion(&mut self, axis: AxisName, motion: Motion<S>) {
         self.plan[axis as usize] = motion;
+    }
+
+    /// Leads an axis whose motion is given from elsewhere to its next sample.
+    #[inline]
+    pub(crate) fn lead(&mut self, axis: AxisName, sample: ReferenceSample<S>) {
+        if let Motion::Given(place) = &mut self.plan[axis as usize] {
+            *place = sample;
+        }
+    }
+
+    /// True if the plan starts in the next tick, unless the law refuses.
+    pub(crate) fn starts_plan(&self) -> bool {
+        matches!(self.command, Some(Command::Run | Command::StartMove(_)))
     }
 
     /// Sets the speed of the spindle.

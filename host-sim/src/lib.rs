@@ -2,6 +2,7 @@
 //!
 //! - [`plant`]: the stage, simulated, with friction that the control law does not know exactly;
 //! - [`law_machine`]: the control law and its supervisor, tick by tick; [`run`]: one run of it on the stage, and its traces;
+//! - [`given_run`]: a run on references in memory, some ticks at a time;
 //! - [`metrics`]: tracking error and quadrant glitch; [`sine_test`]: an axis on a sine, scored; [`benchmark_job`]: the motion
 //!   that ticks are counted and timed with;
 //! - [`stage_setup`]: the stage of a simulated machine, and its settings; [`identified_stage`]: those that commissioning gave;
@@ -16,6 +17,7 @@
 #![allow(missing_docs)]
 
 pub mod benchmark_job;
+pub mod given_run;
 pub mod held_plant;
 pub mod identified_stage;
 pub mod law_machine;

@@ -52,6 +52,12 @@ pub enum RunError {
         axis = .0.axis.map_or("the stage", quadrant_law::axes::AxisName::as_str), tick = .0.tick,
         cause = .0.code.cause(), remedy = .0.code.remedy())]
     Fault(quadrant_law::safety::Fault),
+    /// The axes did not start.
+    #[error(
+        "the axes did not start: nobody has commissioned them, or one that has a law is not commissioned; commission them, or set \
+        `commissioned` of each that has a law"
+    )]
+    NotStarted,
     /// The motion did not end.
     #[error("the motion has not ended after {0} ticks")]
     Endless(usize),

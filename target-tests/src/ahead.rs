@@ -24,12 +24,12 @@ pub(crate) trait Firmware {
 }
 
 /// Runs both for `ticks` ticks and compares all words; `on_compared` is called after each comparison with the ticks compared so
-/// far.
+/// far, and with the input and the answer of each of them.
 pub(crate) fn run<F: Firmware>(
     model: &mut ReferenceModel,
     firmware: &mut F,
     ticks: u32,
-    mut on_compared: impl FnMut(&mut F, u32) -> Result<()>,
+    mut on_compared: impl FnMut(&mut F, u32, &[(InputRecord, Outputs)]) -> Result<()>,
 ) -> Result<Tally> {
     let mut tally = Tally::default();
     let mut expected = VecDeque::new();
@@ -42,7 +42,7 @@ pub(crate) fn run<F: Firmware>(
             }
             let (inputs, outputs) = model.run_alone(batch);
             firmware.ask(&inputs)?;
-            expected.extend(outputs);
+            expected.extend(inputs.into_iter().zip(outputs));
             asked += batch;
         }
         let answers = firmware.answers()?;
@@ -51,11 +51,13 @@ pub(crate) fn run<F: Firmware>(
             "the firmware ended before it answered tick {}",
             compared + 1
         );
-        for (expected, answer) in expected.drain(..answers.len()).zip(answers) {
+        let mut answered = Vec::with_capacity(answers.len());
+        for ((input, expected), answer) in expected.drain(..answers.len()).zip(answers) {
             compared += 1;
             tally.add(compared, expected, answer);
+            answered.push((input, answer));
         }
-        on_compared(firmware, compared)?;
+        on_compared(firmware, compared, &answered)?;
     }
     Ok(tally)
 }
@@ -118,7 +120,7 @@ mod tests {
             left: answered,
         };
         let mut last = 0;
-        let tally = run(&mut model(), &mut firmware, 5000, |_, tick| {
+        let tally = run(&mut model(), &mut firmware, 5000, |_, tick, _| {
             assert!(last < tick);
             last = tick;
             Ok(())

@@ -96,7 +96,7 @@ pub(crate) fn lockstep(toolchain: Toolchain, scalar: Scalar) -> Result<()> {
         // A short chunk runs its last combination again.
         let axes = [0, 1, 2].map(|index: usize| three[index.min(three.len() - 1)]);
         let tally =
-            lockstep::lockstep(&image, ReferenceModel::of(scalar, job(axes))?, TICKS)?.tally;
+            lockstep::lockstep(&image, ReferenceModel::of(scalar, job(axes))?, TICKS, None)?.tally;
         if let Some((tick, model, firmware)) = &tally.first {
             println!(
                 "{axes:?}: first difference at tick {tick}: {model:?} here, {firmware:?} in the firmware"

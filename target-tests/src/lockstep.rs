@@ -1,10 +1,13 @@
 //! `cargo xtask emulate`: the image in QEMU against the simulated stage, word by word beside the reference model in this process.
 
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
-use quadrant_host::machine::emulator::{Clock, Emulator, Lockstep, Memory};
+use quadrant_host::machine::emulator::{Clock, Emulator, Lockstep, Memory, input_of};
 use quadrant_law::stage::Outputs;
 use quadrant_lockstep::{
     InputRecord, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
@@ -38,6 +41,7 @@ pub(crate) fn run(
     job: Job,
     seconds: f64,
     paced: bool,
+    words: Option<&Path>,
 ) -> Result<()> {
     let ticks = seconds * RATE_HZ;
     ensure!(
@@ -51,7 +55,12 @@ pub(crate) fn run(
     let Run { tally, rate } = if paced {
         recorded(&image, model, ticks)?
     } else {
-        lockstep(&image, model, ticks)?
+        let mut log = words.map(WordsFile::create).transpose()?;
+        let run = lockstep(&image, model, ticks, log.as_mut())?;
+        if let Some(log) = log {
+            log.finish()?;
+        }
+        run
     };
     if let Some((tick, model, firmware)) = &tally.first {
         println!("first difference at tick {tick}: {model:?} here, {firmware:?} in the firmware");
@@ -73,22 +82,35 @@ pub(crate) fn run(
 }
 
 /// Runs the image beside the reference model, which runs ahead. The time starts with the first answers: compiling tables is
-/// not a tick.
-pub(crate) fn lockstep(image: &Image, mut model: ReferenceModel, ticks: u32) -> Result<Run> {
+/// not a tick. `words` receives what the firmware read and answered.
+pub(crate) fn lockstep(
+    image: &Image,
+    mut model: ReferenceModel,
+    ticks: u32,
+    mut words: Option<&mut WordsFile>,
+) -> Result<Run> {
     let memory = Memory::create()?;
     memory.prepare(Mode::Lockstep, 0, &reference_model::encode(model.job())?)?;
     let mut firmware = Lockstep::start(reference_model::program(image)?, memory, show)?;
     let bar = progress(ticks);
     let mut first: Option<(Instant, u32)> = None;
-    let tally = ahead::run(&mut model, &mut firmware, ticks, |firmware, tick| {
-        first.get_or_insert_with(|| (Instant::now(), tick));
-        let seconds = (tick / PROGRESS_TICKS).into();
-        if bar.position() != seconds {
-            bar.set_position(seconds);
-            firmware.new_lines()?;
-        }
-        Ok(())
-    })?;
+    let tally = ahead::run(
+        &mut model,
+        &mut firmware,
+        ticks,
+        |firmware, tick, answered| {
+            if let Some(words) = &mut words {
+                words.add(answered)?;
+            }
+            first.get_or_insert_with(|| (Instant::now(), tick));
+            let seconds = (tick / PROGRESS_TICKS).into();
+            if bar.position() != seconds {
+                bar.set_position(seconds);
+                firmware.new_lines()?;
+            }
+            Ok(())
+        },
+    )?;
     bar.finish_and_clear();
     let rate = first.map_or(0.0, |(since, tick)| {
         f64::from(ticks - tick) / since.elapsed().as_secs_f64()
@@ -108,6 +130,32 @@ impl ahead::Firmware for Lockstep {
 
     fn answers(&mut self) -> Result<Vec<Outputs>> {
         Ok(Lockstep::answers(self)?)
+    }
+}
+
+/// What the firmware reads and answers of x, a line a control tick.
+pub(crate) struct WordsFile(BufWriter<File>);
+
+impl WordsFile {
+    fn create(path: &Path) -> Result<Self> {
+        let file =
+            File::create(path).with_context(|| format!("cannot write {}", path.display()))?;
+        let mut out = BufWriter::new(file);
+        writeln!(out, "counts,word,enabled")?;
+        Ok(Self(out))
+    }
+
+    fn add(&mut self, answered: &[(InputRecord, Outputs)]) -> Result<()> {
+        for (input, outputs) in answered {
+            let counts = input_of(input).readings[0].count as i32;
+            let (word, enabled) = (outputs.codes[0].0, u8::from(outputs.enabled));
+            writeln!(self.0, "{counts},{word},{enabled}")?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<()> {
+        Ok(self.0.flush()?)
     }
 }
 

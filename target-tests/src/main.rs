@@ -99,6 +99,9 @@ struct EmulateArgs {
     /// Run on the settings of a file, as `quadrant commission` leaves it, instead of the default ones
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
+    /// Write what the firmware reads and answers of x to a file: counts, word and enable line of each tick
+    #[arg(long, value_name = "FILE", conflicts_with = "paced")]
+    words: Option<PathBuf>,
 }
 
 /// Options that choose faults.
@@ -161,7 +164,8 @@ fn run(cli: Cli) -> Result<()> {
                 Some(path) => reference_model::job_with(path)?,
                 None => reference_model::job(),
             };
-            lockstep::run(toolchain, args.scalar, job, args.seconds, args.paced)
+            let words = args.words.as_deref();
+            lockstep::run(toolchain, args.scalar, job, args.seconds, args.paced, words)
         }
         Verb::BoardSmoke => board_smoke::run(toolchain),
         Verb::Faults(args) => {

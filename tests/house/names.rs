@@ -9,11 +9,12 @@ use crate::source::{code, literals, variants, words};
 use crate::tree::{files, kebab_case, root, sources};
 
 /// Folders at the root whose contents documentation names.
-const FOLDERS: [&str; 14] = [
+const FOLDERS: [&str; 15] = [
     "src",
     "cli",
     "crates",
     "host-sim",
+    "python",
     "studies",
     "target-tests",
     "xtask",
@@ -65,7 +66,7 @@ pub(crate) fn words_of_code(sources: &BTreeMap<String, String>) -> BTreeSet<Stri
 /// Words of code and of manifests.
 fn known_words() -> BTreeSet<String> {
     let mut known = words_of_code(&sources());
-    let others = files(&["toml", "x", "json", "csv", "ngc", "txt"]);
+    let others = files(&["toml", "x", "json", "csv", "ngc", "txt", "py"]);
     // Of recordings the head is enough.
     for text in others.values() {
         known.extend(text.lines().take(2000).flat_map(words));

@@ -9,6 +9,7 @@ mod layout;
 mod lines;
 mod modules;
 mod peers;
+mod python;
 mod setup;
 mod stack;
 mod test;
@@ -84,6 +85,8 @@ enum Verb {
     Linuxcnc(Forwarded),
     /// Time the host simulation beside the same job in C++, Numba and NumPy
     Peers,
+    /// Build the Python package, and run its tests, types, examples and notebooks in a clean environment
+    Python,
     /// Build the page of the bench, which a browser opens
     Web(WebArgs),
     /// Run the commands that README and docs show, in folders below target/documented
@@ -203,6 +206,7 @@ fn run(cli: Cli) -> Result<bool> {
         Verb::Saturation(args) => forward(toolchain()?, "saturation", args)?,
         Verb::Linuxcnc(args) => linuxcnc(args)?,
         Verb::Peers => peers::run()?,
+        Verb::Python => python::run()?,
         Verb::Documented(options) => documented::run(&options)?,
         Verb::Figures { overwrite } => figures::run(overwrite)?,
         Verb::Web(args) => {

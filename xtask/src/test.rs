@@ -13,7 +13,7 @@ use xtask::image::{self, LAW_TRIPLES, LIBRARY_TRIPLES, TRIPLES, Target};
 use xtask::toolchain::{self, Choice, Toolchain};
 use xtask::{command, prove};
 
-use crate::{documented, figures, layout, lines, setup, transcript, web};
+use crate::{documented, figures, layout, lines, python, setup, transcript, web};
 
 /// Settings that a commissioning left, and seconds that the firmware runs on them.
 const COMMISSIONED: &str = "host-sim/data/identified-stage.toml";
@@ -83,6 +83,7 @@ pub(crate) fn run(choice: Choice) -> Result<bool> {
     report.step("every converter word in a browser", || {
         web::check(&web::build(toolchain)?)
     });
+    report.step("the Python package", python::run);
     report.step("LinuxCNC's loops and ours", || {
         command::run(command::command("cargo").args(["xtask", "linuxcnc", "--check"]))
     });

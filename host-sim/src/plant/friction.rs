@@ -76,7 +76,7 @@ impl Presliding {
 
     /// The friction in V without its viscous part, after a displacement (mm) that ended at a speed (mm/s) and took
     /// `step_s`.
-    #[inline]
+    #[inline(always)]
     pub fn step(&mut self, displacement: f64, speed: f64, step_s: f64) -> f64 {
         let direction = Direction::of(displacement);
         match &mut self.0 {

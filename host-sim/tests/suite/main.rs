@@ -2,6 +2,7 @@
 //!
 //! One program of many modules: each would otherwise be linked with the whole library once more.
 
+mod given_run;
 mod machine_motion;
 mod one_axis;
 mod plant;

@@ -12,7 +12,7 @@ use super::form::Form;
 use super::pid::{DesignError, PidDesign, PidRequest, Target, design_pid};
 use super::process::Process;
 use super::search::{BOUND_RESERVES, Search};
-pub use super::search::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK};
+pub use super::search::{COMPLEMENTARY_PEAK, Peaks, SENSITIVITY_PEAK};
 
 /// Band over which a disturbance counts, Hz.
 const BAND_HZ: (f64, f64) = (0.1, 2000.0);
@@ -34,21 +34,40 @@ const FILTER_PERIODS: f64 = 0.52;
 /// # Errors
 /// As [`design_pid`]: a process that allows no such loop.
 pub fn best_pid(process: &Process, form: Form, filter_s: f64) -> Result<PidDesign, DesignError> {
+    best_pid_within(process, form, filter_s, Peaks::default())
+}
+
+/// [`best_pid`] under other bounds on `|S|` and `|T|`.
+///
+/// # Errors
+/// As there.
+pub fn best_pid_within(
+    process: &Process,
+    form: Form,
+    filter_s: f64,
+    peaks: Peaks,
+) -> Result<PidDesign, DesignError> {
     let kept = |tighter: f64| {
         let processes = [(process.clone(), 1.0 - tighter, Vec::new())];
-        Search::new(&processes, form, filter_s).kept(process, form)
+        let search = Search::new(&processes, form, filter_s).within(peaks);
+        search.kept(process, form)
     };
     let best = BOUND_RESERVES.into_iter().find_map(kept);
     // The stiffest loop says what stands in the way.
-    best.map_or_else(|| stiffest(process, form, filter_s), Ok)
+    best.map_or_else(|| stiffest(process, form, filter_s, peaks), Ok)
 }
 
 /// The stiffest loop within the bounds, with a tenth of them for integral action.
-fn stiffest(process: &Process, form: Form, filter_s: f64) -> Result<PidDesign, DesignError> {
+fn stiffest(
+    process: &Process,
+    form: Form,
+    filter_s: f64,
+    peaks: Peaks,
+) -> Result<PidDesign, DesignError> {
     let request = PidRequest {
         target: Target::Bandwidth {
-            sensitivity_peak: SENSITIVITY_PEAK,
-            complementary_peak: COMPLEMENTARY_PEAK,
+            sensitivity_peak: peaks.sensitivity,
+            complementary_peak: peaks.complementary,
             integral_share: 0.1,
         },
         form,

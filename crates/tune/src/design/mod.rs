@@ -21,8 +21,8 @@ pub mod step_response;
 pub mod time_varying;
 
 pub use best::{
-    COMPLEMENTARY_PEAK, SENSITIVITY_PEAK, best_filter_s, best_pid, load_step_error, set_best_pid,
-    with_best_pid,
+    COMPLEMENTARY_PEAK, Peaks, SENSITIVITY_PEAK, best_filter_s, best_pid, best_pid_within,
+    load_step_error, set_best_pid, with_best_pid,
 };
 pub use form::Form;
 pub use integral_gain::largest_integral_gain_where;

@@ -69,8 +69,28 @@ struct Table {
     wider: f64,
 }
 
+/// Bounds on the peaks of `|S|` and `|T|`, each above 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Peaks {
+    /// Bound on `|S|`.
+    pub sensitivity: f64,
+    /// Bound on `|T|`.
+    pub complementary: f64,
+}
+
+impl Default for Peaks {
+    /// [`SENSITIVITY_PEAK`] and [`COMPLEMENTARY_PEAK`].
+    fn default() -> Self {
+        Self {
+            sensitivity: SENSITIVITY_PEAK,
+            complementary: COMPLEMENTARY_PEAK,
+        }
+    }
+}
+
 /// The loops that a PID has to close.
 pub(super) struct Search {
+    peaks: Peaks,
     filter_s: f64,
     tables: Vec<Table>,
     /// Largest Ki Kd / Kp^2.
@@ -111,10 +131,16 @@ impl Search {
             })
             .collect();
         Self {
+            peaks: Peaks::default(),
             filter_s,
             tables,
             most_integral: INTEGRAL_RATIOS.1,
         }
+    }
+
+    /// The same under other bounds.
+    pub(super) fn within(self, peaks: Peaks) -> Self {
+        Self { peaks, ..self }
     }
 
     /// The same with no more than so much integral action, Ki Kd / Kp^2.
@@ -156,8 +182,8 @@ impl Search {
     pub(super) fn kept(&self, process: &Process, form: Form) -> Option<PidDesign> {
         let gains = self.best()?.gains;
         let margins = process.margins(&gains, form).ok()?;
-        let keeps = margins.sensitivity_peak <= SENSITIVITY_PEAK
-            && margins.complementary_peak <= COMPLEMENTARY_PEAK;
+        let keeps = margins.sensitivity_peak <= self.peaks.sensitivity
+            && margins.complementary_peak <= self.peaks.complementary;
         keeps.then_some(PidDesign { gains, margins })
     }
 
@@ -209,6 +235,7 @@ impl Search {
             gains.ki_v_per_mm_s * gains.kd_v_s_per_mm / (gains.kp_v_per_mm * gains.kp_v_per_mm);
         let mut excess = (integral / self.most_integral).max(1.0).powi(2);
         let mut squares = 0.0;
+        let most = self.peaks;
         for (index, table) in self.tables.iter().enumerate() {
             let mut before: Option<(f64, f64)> = None;
             let mut winding = Winding::default();
@@ -216,9 +243,9 @@ impl Search {
                 let open = row.open_loop(gains);
                 winding.pass(open);
                 let distance = (open + 1.0).norm_sqr().max(f64::MIN_POSITIVE);
-                let sensitivity = (SENSITIVITY_PEAK * SENSITIVITY_PEAK * distance).recip();
+                let sensitivity = (most.sensitivity * most.sensitivity * distance).recip();
                 let complementary =
-                    open.norm_sqr() / (COMPLEMENTARY_PEAK * COMPLEMENTARY_PEAK * distance);
+                    open.norm_sqr() / (most.complementary * most.complementary * distance);
                 excess = excess.max(sensitivity.max(complementary) / (table.wider * table.wider));
                 if index == 0 {
                     // The step's spectrum is 1 / omega, and d omega = omega d ln(omega).
@@ -246,7 +273,8 @@ impl Search {
         let mut excluded: Vec<(f64, f64)> = Vec::new();
         for (table, open) in self.tables.iter().zip(&loops) {
             for open in open {
-                excluded.extend(excluded_factors(*open, table.wider).into_iter().flatten());
+                let factors = excluded_factors(*open, table.wider, self.peaks);
+                excluded.extend(factors.into_iter().flatten());
             }
         }
         excluded.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -339,7 +367,7 @@ fn rows(process: &Process, also_hz: &[f64], form: Form, filter_s: f64) -> Vec<Ro
 }
 
 /// The factors on an open loop with which it exceeds the bound on `|S|`, and those with which it exceeds that on `|T|`.
-fn excluded_factors(open: Complex64, wider: f64) -> [Option<(f64, f64)>; 2] {
+fn excluded_factors(open: Complex64, wider: f64, peaks: Peaks) -> [Option<(f64, f64)>; 2] {
     let square = open.norm_sqr();
     // |1 + f L|^2 < 1 / Ms^2 and |f L|^2 > Mt^2 |1 + f L|^2, each |L|^2 f^2 + 2 a Re L f + b < 0: of factors above zero where
     // Re L < 0.
@@ -348,8 +376,8 @@ fn excluded_factors(open: Complex64, wider: f64) -> [Option<(f64, f64)>; 2] {
         let spread = middle * middle - b / square;
         (middle > 0.0 && spread > 0.0).then(|| (middle - spread.sqrt(), middle + spread.sqrt()))
     };
-    let sensitivity = (wider * SENSITIVITY_PEAK).powi(-2);
-    let complementary = (wider * COMPLEMENTARY_PEAK).powi(2);
+    let sensitivity = (wider * peaks.sensitivity).powi(-2);
+    let complementary = (wider * peaks.complementary).powi(2);
     let grown = complementary / (complementary - 1.0);
     [between(1.0, 1.0 - sensitivity), between(grown, grown)]
 }

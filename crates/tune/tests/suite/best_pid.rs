@@ -3,7 +3,7 @@
 use cmaes::{CMAESOptions, DVector};
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::control::plant_model::PlantModel;
-use quadrant_tune::design::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK};
+use quadrant_tune::design::{COMPLEMENTARY_PEAK, Peaks, SENSITIVITY_PEAK, best_pid_within};
 use quadrant_tune::design::{Form, Process, best_pid, load_step_error};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -103,4 +103,25 @@ fn no_other_optimiser_finds_a_pid_that_leaves_less_error_within_the_bounds() {
     );
     assert!(ratios[0].0 < 1.0 + WORSE, "{shown:?}");
     assert!(alone < ratios.len() / 4, "{alone}");
+}
+
+#[test]
+fn other_bounds_are_kept_and_used() {
+    let (plant, form, filter_s) = drawn(3);
+    let process = Process::Model(plant);
+    let design = |sensitivity, complementary| {
+        let peaks = Peaks {
+            sensitivity,
+            complementary,
+        };
+        let found = best_pid_within(&process, form, filter_s, peaks).unwrap();
+        assert!(found.margins.sensitivity_peak <= sensitivity);
+        assert!(found.margins.complementary_peak <= complementary);
+        assert!(
+            found.margins.sensitivity_peak > 0.98 * sensitivity
+                || found.margins.complementary_peak > 0.98 * complementary
+        );
+        load_step_error(&process, &found.gains, form)
+    };
+    assert!(design(2.0, 1.8) < design(1.7, 1.5) && design(1.7, 1.5) < design(1.4, 1.3));
 }

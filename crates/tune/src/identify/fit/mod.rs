@@ -326,8 +326,17 @@ impl<'a, F: Fn(&[f64]) -> Vec<f64> + Sync> Problem<'a, F> {
             column *= *step;
         }
         let normal = jacobian.transpose() * &jacobian;
-        let unknown = DMatrix::from_diagonal_element(count, count, f64::INFINITY);
-        let inverse = normal.try_inverse().unwrap_or(unknown);
+        // A value without any influence is unknown; the others are determined as well as without it.
+        let acting: Vec<usize> = (0..count).filter(|&i| normal[(i, i)] > 0.0).collect();
+        let part = normal.select_rows(&acting).select_columns(&acting);
+        let mut inverse = DMatrix::from_diagonal_element(count, count, f64::INFINITY);
+        if let Some(found) = part.try_inverse() {
+            for (row, &of) in acting.iter().enumerate() {
+                for (column, &other) in acting.iter().enumerate() {
+                    inverse[(of, other)] = found[(row, column)];
+                }
+            }
+        }
         let deviation = |index: usize| inverse[(index, index)].max(0.0).sqrt();
         Fit {
             names: self.parameters.iter().map(|p| p.name).collect(),

@@ -45,6 +45,23 @@ fn exact_data_give_the_exact_parameters() {
 }
 
 #[test]
+fn a_parameter_without_influence_leaves_the_others_their_standard_errors() {
+    let data = decay(0.01, 1);
+    let alone = fit(&[LEVEL, RATE], Loss::Squares, residuals(&data)).unwrap();
+    let idle = Parameter {
+        name: "idle",
+        ..RATE
+    };
+    let with = fit(&[LEVEL, RATE, idle], Loss::Squares, residuals(&data)).unwrap();
+    assert!(with.standard_errors[2].is_infinite());
+    for index in 0..2 {
+        let ratio = with.standard_errors[index] / alone.standard_errors[index];
+        // One more parameter counts.
+        assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
+    }
+}
+
+#[test]
 fn the_truth_lies_within_two_standard_errors_as_often_as_it_should() {
     let inside = (0..200)
         .filter(|&seed| {
