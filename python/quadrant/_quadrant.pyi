@@ -228,7 +228,12 @@ def open_loop(
 ) -> _Complex: ...
 def popov(of: _Plant, of_gains: _Gains, rate_hz: float) -> tuple[float, float, float]: ...
 def npid(
-    of_gains: _Gains, bound: float, sector_share: float, breakaway_v: float | None, range_mm: float
+    of_gains: _Gains,
+    bound: float,
+    sector_share: float,
+    breakaway_v: float | None,
+    range_mm: float,
+    largest: float,
 ) -> tuple[float, float] | None: ...
 def commission_simulated(
     stage: Stage, axis: str, seed: int, trials: bool, progress: object | None
