@@ -18,7 +18,7 @@ const PACKAGES: [&str; 9] = [
     "pandas-stubs",
     "scipy-stubs",
     "jupytext",
-    "nbclient",
+    "nbconvert",
     "ipykernel",
     "dask[distributed]",
     "maturin>=1.9,<2",
