@@ -50,6 +50,8 @@ class Motion:
         acceleration_mm_s2: float = 1000.0,
         jerk_mm_s3: float = 20_000.0,
     ) -> Motion: ...
+    @staticmethod
+    def parse(text: str) -> Motion: ...
     def samples(self, settings: Settings, axis: str) -> tuple[_Floats, _Floats, _Floats]: ...
 
 class Axis:
@@ -228,7 +230,12 @@ def open_loop(
 ) -> _Complex: ...
 def popov(of: _Plant, of_gains: _Gains, rate_hz: float) -> tuple[float, float, float]: ...
 def npid(
-    of_gains: _Gains, bound: float, sector_share: float, breakaway_v: float | None, range_mm: float
+    of_gains: _Gains,
+    bound: float,
+    sector_share: float,
+    breakaway_v: float | None,
+    range_mm: float,
+    largest: float,
 ) -> tuple[float, float] | None: ...
 def commission_simulated(
     stage: Stage, axis: str, seed: int, trials: bool, progress: object | None

@@ -190,9 +190,10 @@ def npid(
     sector_share: float = 0.75,
     breakaway_v: float | None = None,
     range_mm: float = 0.1,
+    largest: float = np.inf,
 ) -> Npid | None:
-    """Chooses the nonlinear gain: a share of the Popov bound, over the error at which the proportional part equals ``breakaway_v``, or over
-    ``range_mm``. None if that leaves no gain above 1."""
+    """Chooses the nonlinear gain: a share of the Popov bound, ``largest`` at most, over the error at which the proportional part equals
+    ``breakaway_v``, or over ``range_mm``. None if that leaves no gain above 1."""
     bound = popov(plant, gains, rate_hz=rate_hz).popov
-    found = _quadrant.npid(gains.numbers(), bound, sector_share, breakaway_v, range_mm)
+    found = _quadrant.npid(gains.numbers(), bound, sector_share, breakaway_v, range_mm, largest)
     return None if found is None else Npid(*found)

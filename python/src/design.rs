@@ -223,6 +223,7 @@ pub(crate) fn npid(
     sector_share: f64,
     breakaway_v: Option<f64>,
     range_mm: f64,
+    largest: f64,
 ) -> PyResult<Option<(f64, f64)>> {
     if !(sector_share > 0.0 && sector_share <= 1.0) {
         return Err(PyValueError::new_err(format!(
@@ -231,6 +232,7 @@ pub(crate) fn npid(
     }
     let rule = NonlinearRule {
         sector_share,
+        largest,
         range: breakaway_v.map_or(Range::Fixed(range_mm), Range::Breakaway),
     };
     let found = choose_nonlinear(&gains(of_gains)?, bound, &rule);

@@ -322,6 +322,9 @@ pub(crate) fn fit_runs<'py>(
     Ok(found)
 }
 
+/// A model with one state: stiffness, exponent or damping, relative error.
+type SingleState = (f64, f64, f64);
+
 /// Dahl's and the LuGre model that come nearest to a GMS model: stiffness, exponent or damping, and the relative error of each.
 #[pyfunction]
 pub(crate) fn fit_single_state(
@@ -330,7 +333,7 @@ pub(crate) fn fit_single_state(
     breakaway: f64,
     coulomb: f64,
     damping: f64,
-) -> PyResult<((f64, f64, f64), (f64, f64, f64))> {
+) -> PyResult<(SingleState, SingleState)> {
     let gms = gms(&elements, attraction)?;
     let dahl = fit_dahl(&gms, breakaway, coulomb).map_err(errors::of)?;
     let lugre = fit_lugre(&gms, breakaway, damping).map_err(errors::of)?;

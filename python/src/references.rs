@@ -10,6 +10,7 @@ use quadrant_law::reference::{
 use quadrant_sim::given_run::GivenReference;
 
 use crate::arrays::{Numbers, finite, same_length};
+use crate::errors;
 use crate::settings::{Settings, axis_name};
 
 /// Longest motion, s.
@@ -124,6 +125,18 @@ impl Motion {
             velocity.into_pyarray(py),
             acceleration.into_pyarray(py),
         ))
+    }
+
+    /// Returns the motion of a text that pickling made.
+    #[staticmethod]
+    fn parse(text: &str) -> PyResult<Self> {
+        let settings = serde_json::from_str(text).map_err(errors::value)?;
+        Ok(Self { settings })
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        let text = serde_json::to_string(&self.settings).map_err(errors::value)?;
+        Ok((py.get_type::<Self>().getattr("parse")?, (text,)))
     }
 
     fn __repr__(&self) -> String {

@@ -115,6 +115,13 @@ def test_stages_refuse_what_cannot_be_and_are_pickled() -> None:
     assert any(name == "mass_kg" for name, *_ in quadrant.Stage.fields())
 
 
+def test_a_motion_that_was_pickled_has_the_same_samples() -> None:
+    for motion in (SINE, quadrant.Motion.move_by(-3.7, 41.3)):
+        again = pickle.loads(pickle.dumps(motion))
+        for ours, theirs in zip(motion.samples(SETTINGS, "x"), again.samples(SETTINGS, "x")):
+            assert np.array_equal(ours, theirs)
+
+
 def test_axes_that_nobody_has_commissioned_do_not_start() -> None:
     with pytest.raises(ValueError, match="commission"):
         quadrant.simulate(quadrant.Stage(mass_kg=9.0).settings(), SINE)

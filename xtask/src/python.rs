@@ -18,7 +18,7 @@ const PACKAGES: [&str; 9] = [
     "pandas-stubs",
     "scipy-stubs",
     "jupytext",
-    "nbclient",
+    "nbconvert",
     "ipykernel",
     "dask[distributed]",
     "maturin>=1.9,<2",
@@ -31,26 +31,28 @@ pub(crate) fn run() -> Result<()> {
     let python = environment(&folder)?;
     let wheel = wheel(&sources, &folder, &python)?;
     pip(&python, &[&format!("{}[all]", wheel.display())])?;
-    let in_sources = |arguments: &[&str]| {
-        command::run(
-            command::command(&python)
-                .current_dir(&sources)
-                .env("MPLBACKEND", "Agg")
-                .args(arguments),
-        )
-    };
-    in_sources(&["-m", "pytest", "--quiet"])?;
-    in_sources(&["-m", "mypy", "--strict", "quadrant", "tests", "examples"])?;
     let left = folder.join("left");
     fs::create_dir_all(&left)?;
+    // Not in the sources: there the package would be found without its library.
+    let in_left = || {
+        let mut python = command::command(&python);
+        python.current_dir(&left).env("MPLBACKEND", "Agg");
+        python
+    };
+    command::run(
+        in_left()
+            .args(["-m", "pytest", "--quiet", "--rootdir"])
+            .arg(&sources)
+            .arg(sources.join("tests")),
+    )?;
+    command::run(
+        command::command(&python)
+            .current_dir(&sources)
+            .args(["-m", "mypy", "--strict", "quadrant", "tests", "examples"]),
+    )?;
     for example in scripts(&sources.join("examples"))? {
         println!("{}", example.display());
-        command::run_quietly(
-            command::command(&python)
-                .current_dir(&left)
-                .env("MPLBACKEND", "Agg")
-                .arg(&example),
-        )?;
+        command::run_quietly(in_left().arg(&example))?;
     }
     for notebook in scripts(&sources.join("notebooks"))? {
         println!("{}", notebook.display());
@@ -58,7 +60,7 @@ pub(crate) fn run() -> Result<()> {
             .join(notebook.file_name().unwrap_or_default())
             .with_extension("ipynb");
         command::run_quietly(
-            command::command(&python)
+            in_left()
                 .args(["-m", "jupytext", "--to", "ipynb", "--set-kernel", "python3"])
                 .args(["--execute", "--run-path"])
                 .arg(sources.join("notebooks"))

@@ -48,7 +48,7 @@ fn samples_of_a_plan_run_as_the_plan_does() {
     let found = finished(GivenRun::of_stage(&settings, &truth, references, 3).unwrap());
     for (planned, found) in planned.iter().zip(&found) {
         // The plan's trace begins with the look-ahead.
-        let after = &planned.output_v[13..];
+        let after: Vec<f32> = planned.output_v[13..].iter().map(|v| *v as f32).collect();
         let count = after.len().min(found.output_v.len());
         assert!(count > 5000, "{count}");
         assert_eq!(after[..count], found.output_v[..count]);
