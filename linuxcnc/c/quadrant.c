@@ -39,19 +39,19 @@ typedef struct {
     hal_float_t *position_cmd, *velocity_cmd, *position_fb;
     hal_s32_t *rawcounts;
     hal_bit_t *enable, *amp_fault;
-    hal_float_t *gains[4];
+    hal_float_t *gains[5];
     hal_float_t *output, *ff_level, *ff_viscous, *ff_presliding, *ff_inertia, *error, *learning;
     hal_bit_t *faulted;
     hal_s32_t *fault;
 } joint_t;
 
 typedef struct {
-    hal_bit_t *estop, *driven;
+    hal_bit_t *estop, *driven, *store_failed;
     joint_t joint[3];
 } hal_quadrant_t;
 
 static const char axes[] = "xyz";
-static const char *const gains[] = {"Pgain", "Igain", "Dgain", "FF2"};
+static const char *const gains[] = {"Pgain", "Igain", "Dgain", "FF1", "FF2"};
 static int comp_id;
 static hal_quadrant_t *hal;
 static struct Board *board;
@@ -63,7 +63,7 @@ static int has(int axis) { return strchr(joints, axes[axis]) != NULL; }
 
 static void update(void *arg, long period)
 {
-    double asked[3][4];
+    double asked[3][5];
     int n, g;
 
     if (ends) return;
@@ -80,15 +80,16 @@ static void update(void *arg, long period)
         to->rawcounts = *from->rawcounts;
         to->enable = *from->enable;
         to->amp_fault = *from->amp_fault;
-        for (g = 0; g < 4; g++) to->gains[g] = asked[n][g] = *from->gains[g];
+        for (g = 0; g < 5; g++) to->gains[g] = asked[n][g] = *from->gains[g];
     }
     quadrant_tick(board, &pins);
     *hal->driven = pins.driven;
+    *hal->store_failed = pins.store_failed;
     for (n = 0; n < 3; n++) {
         struct QuadrantJoint *from = &pins.joints[n];
         joint_t *to = &hal->joint[n];
         if (!has(n)) continue;
-        for (g = 0; g < 4; g++)
+        for (g = 0; g < 5; g++)
             if (from->gains[g] != asked[n][g]) *to->gains[g] = from->gains[g];
         *to->output = from->output;
         *to->ff_level = from->ff_level;
@@ -112,7 +113,7 @@ static int export_joint(joint_t *j, char axis)
     r |= hal_pin_s32_newf(HAL_IN, &j->rawcounts, comp_id, "quadrant.%c.rawcounts", axis);
     r |= hal_pin_bit_newf(HAL_IN, &j->enable, comp_id, "quadrant.%c.enable", axis);
     r |= hal_pin_bit_newf(HAL_IN, &j->amp_fault, comp_id, "quadrant.%c.amp-fault", axis);
-    for (g = 0; g < 4; g++)
+    for (g = 0; g < 5; g++)
         r |= hal_pin_float_newf(HAL_IO, &j->gains[g], comp_id, "quadrant.%c.%s", axis, gains[g]);
     r |= hal_pin_float_newf(HAL_OUT, &j->output, comp_id, "quadrant.%c.output", axis);
     r |= hal_pin_float_newf(HAL_OUT, &j->ff_level, comp_id, "quadrant.%c.ff-level", axis);
@@ -126,7 +127,22 @@ static int export_joint(joint_t *j, char axis)
     return r;
 }
 
-int rtapi_app_main(void)
+/* The parameters as before loadrt: the module stays in memory when it is unloaded, and the next loadrt sets what it names. */
+static void forget(void)
+{
+    settings = defaults = "";
+    joints = "x,y,z";
+    units = "mm";
+    feedback = "rawcounts";
+    mode = "full";
+    preview = "extrapolate";
+    address = "127.0.0.1";
+    port = 7711;
+    rate = 1000;
+    late = 0;
+}
+
+static int start(void)
 {
     struct QuadrantConfig config = {
         .settings = settings, .defaults = defaults, .joints = joints, .units = units, .feedback = feedback,
@@ -134,7 +150,6 @@ int rtapi_app_main(void)
     };
     int n, r;
 
-    /* The module may have stayed in memory since it was unloaded. */
     ends = 0;
     memset(&pins, 0, sizeof(pins));
     comp_id = hal_init("quadrant");
@@ -148,6 +163,7 @@ int rtapi_app_main(void)
     }
     r = hal_pin_bit_newf(HAL_IN, &hal->estop, comp_id, "quadrant.estop");
     r |= hal_pin_bit_newf(HAL_OUT, &hal->driven, comp_id, "quadrant.driven");
+    r |= hal_pin_bit_newf(HAL_OUT, &hal->store_failed, comp_id, "quadrant.store-failed");
     for (n = 0; n < 3; n++)
         if (has(n)) r |= export_joint(&hal->joint[n], axes[n]);
     r |= hal_export_funct("quadrant.update", update, NULL, 1, 0, comp_id);
@@ -158,6 +174,14 @@ int rtapi_app_main(void)
     }
     hal_ready(comp_id);
     return 0;
+}
+
+int rtapi_app_main(void)
+{
+    int r = start();
+
+    if (r != 0) forget();
+    return r;
 }
 
 void rtapi_app_exit(void)
@@ -172,4 +196,5 @@ void rtapi_app_exit(void)
     *hal->driven = 0;
     hal_exit(comp_id);
     quadrant_stop(board);
+    forget();
 }

@@ -69,8 +69,8 @@ typedef struct QuadrantJoint {
   bool enable;
   // In: the amplifier reports a fault.
   bool amp_fault;
-  // In and out: P, I, D and FF2, V, machine units and s: those in force, or others that are to act.
-  double gains[4];
+  // In and out: P, I, D, FF1 and FF2, V, machine units and s: those in force, or others that are to act.
+  double gains[5];
   // Out: voltage for the amplifier, V.
   double output;
   // Out: friction that is fed forward, V: the level of Coulomb and Stribeck.
@@ -103,6 +103,8 @@ typedef struct QuadrantPins {
   bool estop;
   // Out: the outputs are driven.
   bool driven;
+  // Out: what a host has stored could not be written to its file.
+  bool store_failed;
   // The joints: x, y, z.
   struct QuadrantJoint joints[3];
 } QuadrantPins;
@@ -131,10 +133,14 @@ typedef struct QuadrantPlantAxis {
   double position_cmd;
   // In: the encoder shows its last count.
   bool freeze;
+  // In and out: the next index pulse makes its place zero, and ends this.
+  bool index_enable;
   // Out: the encoder's count.
   int32_t rawcounts;
-  // Out: the same, mm.
+  // Out: the same since the index, mm.
   double position_fb;
+  // Out: largest change of the voltage from one period to the next, just after the index, V.
+  double index_step;
 } QuadrantPlantAxis;
 
 // The pins of the simulated stage.
@@ -181,7 +187,7 @@ void quadrant_plant_read(struct Plant *plant, struct QuadrantPlantPins *pins);
 //
 // # Safety
 // As [`quadrant_plant_read`].
-void quadrant_plant_write(struct Plant *plant, const struct QuadrantPlantPins *pins);
+void quadrant_plant_write(struct Plant *plant, struct QuadrantPlantPins *pins);
 
 // Ends the simulated stage, and writes the record.
 //

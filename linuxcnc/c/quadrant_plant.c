@@ -23,8 +23,8 @@ static int room = 400000;
 RTAPI_MP_INT(room, "longest record, ticks");
 
 typedef struct {
-    hal_float_t *voltage, *position_cmd, *position_fb;
-    hal_bit_t *freeze;
+    hal_float_t *voltage, *position_cmd, *position_fb, *index_step;
+    hal_bit_t *freeze, *index_enable;
     hal_s32_t *rawcounts;
 } axis_t;
 
@@ -43,11 +43,15 @@ static void read_encoders(void *arg, long period)
 {
     int n;
 
-    for (n = 0; n < 3; n++) pins.axes[n].freeze = *hal->axis[n].freeze;
+    for (n = 0; n < 3; n++) {
+        pins.axes[n].freeze = *hal->axis[n].freeze;
+        pins.axes[n].index_enable = *hal->axis[n].index_enable;
+    }
     quadrant_plant_read(plant, &pins);
     for (n = 0; n < 3; n++) {
         *hal->axis[n].rawcounts = pins.axes[n].rawcounts;
         *hal->axis[n].position_fb = pins.axes[n].position_fb;
+        *hal->axis[n].index_enable = pins.axes[n].index_enable;
     }
 }
 
@@ -62,16 +66,26 @@ static void write_voltages(void *arg, long period)
         pins.axes[n].position_cmd = *hal->axis[n].position_cmd;
     }
     quadrant_plant_write(plant, &pins);
+    for (n = 0; n < 3; n++) *hal->axis[n].index_step = pins.axes[n].index_step;
 }
 
-int rtapi_app_main(void)
+/* The parameters as before loadrt: the module stays in memory when it is unloaded, and the next loadrt sets what it names. */
+static void forget(void)
+{
+    file = record = "";
+    rate = 1000;
+    drive_lag_us = 0;
+    seed = 1;
+    room = 400000;
+}
+
+static int start(void)
 {
     struct QuadrantPlantConfig config = {
         .file = file, .record = record, .rate = rate, .drive_lag_us = drive_lag_us, .seed = seed, .room = room,
     };
     int n, r;
 
-    /* The module may have stayed in memory since it was unloaded. */
     memset(&pins, 0, sizeof(pins));
     comp_id = hal_init("quadrant_plant");
     if (comp_id < 0) return comp_id;
@@ -86,6 +100,8 @@ int rtapi_app_main(void)
             r |= hal_pin_float_newf(HAL_IN, &a->voltage, comp_id, "quadrant_plant.%c.voltage", axes[n]);
             r |= hal_pin_float_newf(HAL_IN, &a->position_cmd, comp_id, "quadrant_plant.%c.position-cmd", axes[n]);
             r |= hal_pin_bit_newf(HAL_IN, &a->freeze, comp_id, "quadrant_plant.%c.freeze", axes[n]);
+            r |= hal_pin_bit_newf(HAL_IO, &a->index_enable, comp_id, "quadrant_plant.%c.index-enable", axes[n]);
+            r |= hal_pin_float_newf(HAL_OUT, &a->index_step, comp_id, "quadrant_plant.%c.index-step", axes[n]);
             r |= hal_pin_float_newf(HAL_OUT, &a->position_fb, comp_id, "quadrant_plant.%c.position-fb", axes[n]);
             r |= hal_pin_s32_newf(HAL_OUT, &a->rawcounts, comp_id, "quadrant_plant.%c.rawcounts", axes[n]);
         }
@@ -101,8 +117,17 @@ int rtapi_app_main(void)
     return 0;
 }
 
+int rtapi_app_main(void)
+{
+    int r = start();
+
+    if (r != 0) forget();
+    return r;
+}
+
 void rtapi_app_exit(void)
 {
     hal_exit(comp_id);
     quadrant_plant_stop(plant);
+    forget();
 }

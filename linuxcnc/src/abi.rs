@@ -225,7 +225,7 @@ pub unsafe extern "C" fn quadrant_plant_read(plant: *mut Plant, pins: &mut Quadr
 /// # Safety
 /// As [`quadrant_plant_read`].
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn quadrant_plant_write(plant: *mut Plant, pins: &QuadrantPlantPins) {
+pub unsafe extern "C" fn quadrant_plant_write(plant: *mut Plant, pins: &mut QuadrantPlantPins) {
     // SAFETY: as the caller says.
     unsafe { &mut *plant }.write(pins);
 }

@@ -45,8 +45,8 @@ pub struct QuadrantJoint {
     pub enable: bool,
     /// In: the amplifier reports a fault.
     pub amp_fault: bool,
-    /// In and out: P, I, D and FF2, V, machine units and s: those in force, or others that are to act.
-    pub gains: [f64; 4],
+    /// In and out: P, I, D, FF1 and FF2, V, machine units and s: those in force, or others that are to act.
+    pub gains: [f64; 5],
     /// Out: voltage for the amplifier, V.
     pub output: f64,
     /// Out: friction that is fed forward, V: the level of Coulomb and Stribeck.
@@ -81,6 +81,8 @@ pub struct QuadrantPins {
     pub estop: bool,
     /// Out: the outputs are driven.
     pub driven: bool,
+    /// Out: what a host has stored could not be written to its file.
+    pub store_failed: bool,
     /// The joints: x, y, z.
     pub joints: [QuadrantJoint; 3],
 }
@@ -135,7 +137,7 @@ struct Joint {
     reference: CommandReference,
     rawcounts: i32,
     /// The gains that the pins show.
-    gains: [f64; 4],
+    gains: [f64; 5],
     was_enabled: bool,
     hold: Hold,
     /// Scale of the output's words, and what it was made of.
@@ -202,7 +204,7 @@ impl Board {
                     (longest - ticks(index)) as usize,
                 ),
                 rawcounts: 0,
-                gains: [0.0; 4],
+                gains: [0.0; 5],
                 was_enabled: false,
                 hold: Hold::Released,
                 codes_per_volt: 0.0,
@@ -434,6 +436,7 @@ impl Board {
             self.fault = fault.code.number().into();
         }
         pins.driven = outputs.enabled && !(any && self.fault != 0);
+        pins.store_failed = self.ends.store_failed.load(Ordering::Relaxed);
         // While the outputs are being enabled, an old fault is being reset.
         let fault = if self.fault == 0 && self.enabling == 0 {
             safety.fault().map_or(0, |fault| fault.code.number().into())

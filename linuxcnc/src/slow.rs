@@ -17,7 +17,7 @@ use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_link::message::NumberType;
 use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
-use quadrant_sim::settings_file::SettingsFile;
+use quadrant_sim::settings_file::{SettingsFile, defaults_at};
 
 use crate::port::Port;
 
@@ -37,8 +37,8 @@ pub(crate) struct Report {
     pub(crate) timing: TimingStatistics,
 }
 
-/// Gains of an axis that can be set live: P, I and D, and inertia; V, mm and s.
-pub(crate) type Gains = [f64; 4];
+/// Gains of an axis that can be set live: P, I and D, viscous friction and inertia; V, mm and s.
+pub(crate) type Gains = [f64; 5];
 
 /// Gains that the pins ask for.
 #[derive(Clone, Copy, Debug)]
@@ -72,6 +72,7 @@ pub(crate) struct FastEnds {
     pub(crate) reports: Producer<'static, Report, 2>,
     pub(crate) answers: Consumer<'static, Answer, 8>,
     pub(crate) outputs_off: Arc<AtomicBool>,
+    pub(crate) store_failed: Arc<AtomicBool>,
 }
 
 /// Files and address of a component.
@@ -116,7 +117,10 @@ pub(crate) struct Started {
 pub(crate) fn start(place: &Place<'_>) -> io::Result<Started> {
     let defaults = match place.defaults {
         Some(path) => SettingsFile::read(path).map_err(io::Error::other)?.stage,
-        None => uncommissioned(place.rate_hz),
+        None => StageSettings {
+            rate_hz: place.rate_hz,
+            ..defaults_at(place.rate_hz)
+        },
     };
     let open = |path| FlashFile::open(path, memory_flash::BYTES);
     let file = place.store.map(open).transpose()?;
@@ -135,6 +139,7 @@ pub(crate) fn start(place: &Place<'_>) -> io::Result<Started> {
     let (wishes, wishes_out) = Box::leak(Box::new(Wishes::new())).split();
     let stop = Arc::new(AtomicBool::new(false));
     let outputs_off = Arc::new(AtomicBool::new(true));
+    let store_failed = Arc::new(AtomicBool::new(false));
     let slow = Slow {
         half,
         file,
@@ -144,6 +149,7 @@ pub(crate) fn start(place: &Place<'_>) -> io::Result<Started> {
         wishes: wishes_out,
         served: 0,
         outputs_off: Arc::clone(&outputs_off),
+        store_failed: Arc::clone(&store_failed),
     };
     let stopped = Arc::clone(&stop);
     let thread = thread::Builder::new()
@@ -157,6 +163,7 @@ pub(crate) fn start(place: &Place<'_>) -> io::Result<Started> {
             reports,
             answers,
             outputs_off,
+            store_failed,
         },
         thread: SlowThread {
             stop,
@@ -165,40 +172,38 @@ pub(crate) fn start(place: &Place<'_>) -> io::Result<Started> {
     })
 }
 
-/// The gains of an axis.
+/// The gains of an axis; the viscous one is the mean of both directions.
 fn gains_of(axis: &AxisSettings) -> Gains {
     let pid = &axis.feedback.pid;
-    let inertia = axis.feedforward.gains.inertia_v_s2_per_mm;
+    let gains = &axis.feedforward.gains;
+    let sliding = &axis.friction.sliding;
+    let viscous = sliding.positive.viscous_v_s_per_mm + sliding.negative.viscous_v_s_per_mm;
     [
         pid.kp_v_per_mm,
         pid.ki_v_per_mm_s,
         pid.kd_v_s_per_mm,
-        inertia,
+        0.5 * gains.viscous * viscous,
+        gains.inertia_v_s2_per_mm,
     ]
 }
 
-/// Sets the gains of an axis.
+/// Sets the gains of an axis. A viscous one that stays leaves the directions as they differ.
 fn set(axis: &mut AxisSettings, gains: Gains) {
+    let [.., viscous, _] = gains_of(axis);
     let pid = &mut axis.feedback.pid;
+    let asked;
     [
         pid.kp_v_per_mm,
         pid.ki_v_per_mm_s,
         pid.kd_v_s_per_mm,
+        asked,
         axis.feedforward.gains.inertia_v_s2_per_mm,
     ] = gains;
-}
-
-/// The settings of a machine that nobody has commissioned, at a rate.
-fn uncommissioned(rate_hz: f64) -> StageSettings {
-    let mut settings = StageSettings {
-        rate_hz,
-        ..StageSettings::default()
-    };
-    for axis in &mut settings.axes {
-        let filter_s = &mut axis.feedback.pid.derivative_filter_s;
-        *filter_s = filter_s.max(0.5 / rate_hz);
+    if asked != viscous {
+        axis.feedforward.gains.viscous = 1.0;
+        axis.friction.sliding.positive.viscous_v_s_per_mm = asked;
+        axis.friction.sliding.negative.viscous_v_s_per_mm = asked;
     }
-    settings
 }
 
 /// Everything that the thread owns.
@@ -212,6 +217,8 @@ struct Slow {
     /// Wishes served so far; wraps.
     served: u32,
     outputs_off: Arc<AtomicBool>,
+    /// The file does not keep what a host has stored.
+    store_failed: Arc<AtomicBool>,
 }
 
 impl Slow {
@@ -244,10 +251,14 @@ impl Slow {
                 "quadrant: a host asks for a restart: unload the component and load it again"
             );
         }
-        if let Some(file) = &mut self.file
-            && let Err(error) = file.keep(self.half.flash().bytes())
-        {
-            eprintln!("quadrant: {error}");
+        if let Some(file) = &mut self.file {
+            let kept = file.keep(self.half.flash().bytes());
+            let failed = self.store_failed.swap(kept.is_err(), Ordering::Relaxed);
+            if let Err(error) = kept
+                && !failed
+            {
+                eprintln!("quadrant: {error}");
+            }
         }
         self.answer();
     }

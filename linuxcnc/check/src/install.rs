@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use xtask::command;
 
+use crate::prove;
+
 /// The components, by the names of their sources and modules.
 const COMPONENTS: [&str; 2] = ["quadrant", "quadrant_plant"];
 /// Folder of LinuxCNC's realtime modules.
@@ -98,7 +100,7 @@ pub(crate) fn build(folder: &Path) -> Result<()> {
         fs::write(file("ver"), format!("{{ global: {names}local: *; }};\n"))?;
         command::run(
             command::command("gcc")
-                .args(["-shared", "-Wl,-Bsymbolic", "-Wl,--gc-sections", "-s"])
+                .args(["-shared", "-Wl,-Bsymbolic", "-Wl,--gc-sections"])
                 .arg(format!("-Wl,--version-script={}", file("ver").display()))
                 .arg("-o")
                 .args([file("so"), file("o")])
@@ -113,13 +115,19 @@ pub(crate) fn build(folder: &Path) -> Result<()> {
 pub(crate) fn install() -> Result<()> {
     let folder = tempfile::tempdir()?;
     build(folder.path())?;
+    prove::prove(&folder.path().join("quadrant.so"))?;
     for component in COMPONENTS {
         let module = format!("{component}.so");
         let place = Path::new(MODULES).join(&module);
         // A module that is loaded keeps its old content.
         let _ = fs::remove_file(&place);
-        fs::copy(folder.path().join(&module), &place)
-            .with_context(|| format!("{}: run it as root", place.display()))?;
+        command::run_quietly(
+            command::command("strip")
+                .arg("-o")
+                .arg(&place)
+                .arg(folder.path().join(&module)),
+        )
+        .with_context(|| format!("{}: run it as root", place.display()))?;
         println!("{}", place.display());
     }
     fs::create_dir_all(MANUALS)?;

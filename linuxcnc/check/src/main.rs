@@ -1,15 +1,18 @@
 //! `cargo xtask linuxcnc`: the components of LinuxCNC, built, installed, run and judged.
 
 mod install;
+mod picture;
+mod prove;
 mod score;
 mod session;
 
 use std::path::Path;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::Parser;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::learning::LearningSettings;
+use quadrant_report::Series;
 use quadrant_settings::StageSettings;
 use quadrant_sim::identified_stage::identified_settings;
 use quadrant_sim::plant::DRIVE_MM_S_PER_V;
@@ -24,6 +27,8 @@ const AT_A_TIME: usize = 8;
 const RATES_HZ: [f64; 2] = [1e3, 4e3];
 /// Lag of amplifiers in velocity mode, us.
 const VELOCITY_LAG_US: u32 = 2000;
+/// Largest step of a voltage in a period while an axis passes its index at 1 mm/s, V: a jump by a turn would be volts.
+const MOST_INDEX_STEP_V: f64 = 0.1;
 /// Seeds of the stage's noise.
 const SEEDS: [u32; 3] = [1, 2, 3];
 
@@ -43,6 +48,9 @@ struct Options {
     /// Run a part program without a screen under four loops, and judge them
     #[arg(long, conflicts_with = "run")]
     check: bool,
+    /// Repeat the part program under pid with our feedforward for so many minutes instead, and print the times of the functions
+    #[arg(long, requires = "check", value_name = "MINUTES")]
+    minutes: Option<u32>,
     /// Keep what the check leaves, in this folder
     #[arg(long, requires = "check")]
     keep: Option<std::path::PathBuf>,
@@ -196,27 +204,45 @@ fn check(folder: &Path, with_delay: bool, again: bool) -> Result<()> {
                     preview: way.preview,
                     drive_lag_us: way.drive_lag_us,
                     seed,
+                    minutes: 0,
                 });
             }
         }
     }
     let mut scores = Vec::new();
+    let mut curves = Vec::new();
+    // Of LinuxCNC's loops and of ours.
+    let mut index_steps = [0.0_f64; 2];
     let mut judge = |session: &Session, folder: &Path| -> Result<()> {
         let record = score::read(&folder.join("record"))?;
-        scores.push(score::judge(&record, session.settings.rate_hz));
+        let rate_hz = session.settings.rate_hz;
+        scores.push(score::judge(&record, rate_hz));
+        if let Some(way) = way_in_picture(loops, session) {
+            curves.push(picture::curve(way.words, &record, rate_hz, curves.len())?);
+        }
+        // LinuxCNC begins again at the feedback, so that its command steps by an axis' lag where there is one.
+        if session.preview == "extrapolate" && session.drive_lag_us == 0 {
+            let most = &mut index_steps[usize::from(session.loops == "quadrant.hal")];
+            *most = most.max(score::index_step(folder)?);
+        }
         Ok(())
     };
     if again {
         for session in &sessions {
             judge(session, &folder.join(&session.name))?;
         }
-        return report(loops, &scores);
+        draw(curves, folder)?;
+        return report(loops, &scores, index_steps);
     }
     if let Some(session) = sessions.first() {
-        session::start_faults(session, folder)?.finish()?;
+        let [faults, units] =
+            ["faults", "units"].map(|name| session::start_halrun(session, folder, name));
+        faults?.finish()?;
         println!(
             "unloaded while it drove, loaded again, an encoder stopped: the voltages were zero"
         );
+        units?.finish()?;
+        println!("followed in inches; friction as a torque offset in per mille");
     }
     for wave in sessions.chunks(AT_A_TIME) {
         let running: Vec<_> = wave
@@ -227,11 +253,93 @@ fn check(folder: &Path, with_delay: bool, again: bool) -> Result<()> {
             judge(session, &running.finish()?)?;
         }
     }
-    report(loops, &scores)
+    draw(curves, folder)?;
+    report(loops, &scores, index_steps)
 }
 
-/// Prints the table; an error if a loop of ours is worse than LinuxCNC's.
-fn report(loops: &[Loop], scores: &[Score]) -> Result<()> {
+/// The loop of a session whose reversal is drawn: each that pid and our feedforward are in, at the slower rate.
+fn way_in_picture<'a>(loops: &'a [Loop], session: &Session) -> Option<&'a Loop> {
+    let drawn = loops
+        .iter()
+        .filter(|way| matches!(way.letter, "a" | "c" | "d"));
+    let name = |way: &Loop| format!("{}-{}-{}", RATES_HZ[0], way.letter, SEEDS[0]);
+    drawn.into_iter().find(|way| name(way) == session.name)
+}
+
+/// Leaves the picture in the folder.
+fn draw(curves: Vec<Series>, folder: &Path) -> Result<()> {
+    let picture = picture::svg(curves, RATES_HZ[0])?;
+    std::fs::write(folder.join("linuxcnc-reversal.svg"), picture)?;
+    Ok(())
+}
+
+/// Repeats the part program with `pid` and our component in one thread, and prints how long each takes.
+fn measure_times(folder: &Path, minutes: u32) -> Result<()> {
+    let settings = settings_at(RATES_HZ[0])?;
+    let session = Session {
+        name: "times".to_owned(),
+        loops: "feedforward.hal\nHALFILE = times.hal",
+        gains: pid_gains(&settings),
+        settings: for_pid(&settings),
+        preview: "extrapolate",
+        drive_lag_us: 0,
+        seed: SEEDS[0],
+        minutes,
+    };
+    let folder = session::start(&session, folder)?.finish()?;
+    let text = std::fs::read_to_string(folder.join("times"))?;
+    let mut lines: Vec<Vec<f64>> = text
+        .lines()
+        .map(|line| line.split(' ').map(str::parse).collect())
+        .collect::<Result<_, _>>()?;
+    let jitter_ns = lines.pop().context("the jitter")?;
+    let longest = lines.pop().context("the longest times")?;
+    // LinuxCNC counts the processor's clocks.
+    let processors = std::fs::read_to_string("/proc/cpuinfo")?;
+    let clock = processors
+        .lines()
+        .find_map(|line| line.strip_prefix("cpu MHz"));
+    let clock = clock.and_then(|line| line.split(": ").nth(1)?.parse::<f64>().ok());
+    let clock_mhz = clock.context("the processor's clock")?;
+    println!(
+        "us, over {minutes} minutes; {} calls, and the longest of all",
+        lines.len()
+    );
+    println!("| function | median | 99 % | longest |\n|---|---|---|---|");
+    let functions = [
+        "quadrant, three joints",
+        "pid, one joint",
+        "motion-controller",
+        "the whole thread",
+    ];
+    for (index, function) in functions.iter().enumerate() {
+        let mut times: Vec<f64> = lines.iter().map(|line| line[index] / clock_mhz).collect();
+        times.sort_by(f64::total_cmp);
+        let share = |share: f64| times[((times.len() - 1) as f64 * share) as usize];
+        println!(
+            "| {function} | {:.2} | {:.2} | {:.0} |",
+            share(0.5),
+            share(0.99),
+            longest[index] / clock_mhz
+        );
+    }
+    println!(
+        "largest jitter of the thread: {:.0} us",
+        1e-3 * jitter_ns[0]
+    );
+    Ok(())
+}
+
+/// Prints the table; an error if a loop of ours is worse than LinuxCNC's, or homing to the index makes its voltage jump.
+fn report(loops: &[Loop], scores: &[Score], index_steps: [f64; 2]) -> Result<()> {
+    let [pid, ours] = index_steps;
+    println!(
+        "homed to the index: the voltage stepped by {ours:.3} V at most, and by {pid:.3} V with pid"
+    );
+    ensure!(
+        ours < MOST_INDEX_STEP_V,
+        "a jump by the index reaches the voltage"
+    );
     println!(
         "um, simulated; means of {} seeds, and against (a)",
         SEEDS.len()
@@ -285,6 +393,7 @@ fn run() -> Result<()> {
         preview: "extrapolate",
         drive_lag_us: 0,
         seed: SEEDS[0],
+        minutes: 0,
     };
     session::write(&session, &folder, "axis")?;
     xtask::command::run(xtask::command::command("linuxcnc").arg(folder.join("machine.ini")))
@@ -309,7 +418,11 @@ fn main() -> Result<()> {
         let folder = options.keep.as_deref().unwrap_or(temporary.path());
         std::fs::create_dir_all(folder)?;
         xtask::command::run_quietly(xtask::command::command("chmod").arg("755").arg(folder))?;
-        return check(&folder.canonicalize()?, options.delay, options.again);
+        let folder = folder.canonicalize()?;
+        if let Some(minutes) = options.minutes {
+            return measure_times(&folder, minutes);
+        }
+        return check(&folder, options.delay, options.again);
     }
     Ok(())
 }

@@ -47,6 +47,13 @@ pub(crate) fn read(path: &Path) -> Result<Vec<Recorded>> {
     Ok(numbers.as_chunks::<6>().0.iter().map(tick).collect())
 }
 
+/// Largest step of a voltage just after the index pulse to which LinuxCNC homed, V.
+pub(crate) fn index_step(folder: &Path) -> Result<f64> {
+    let text = fs::read_to_string(folder.join("index"))?;
+    let mut steps = text.lines().map(str::parse::<f64>);
+    Ok(steps.try_fold(0.0, |most, step| step.map(|step| step.max(most)))?)
+}
+
 /// Judges a record of a thread of `rate_hz`.
 pub(crate) fn judge(record: &[Recorded], rate_hz: f64) -> Score {
     // Homing sets the origin to within a count or two: the circles are where the commands go.

@@ -34,6 +34,8 @@ pub(crate) struct Session {
     pub(crate) drive_lag_us: u32,
     /// Seed of the stage's noise.
     pub(crate) seed: u32,
+    /// Minutes for which the part program is repeated, and times are taken; 0 for once.
+    pub(crate) minutes: u32,
 }
 
 /// Makes the user, unless there is one.
@@ -62,6 +64,7 @@ pub(crate) fn write(session: &Session, folder: &Path, display: &str) -> Result<(
     let seed = session.seed.to_string();
     let mut values = vec![
         ("DISPLAY", "DISPLAY", display.to_owned()),
+        ("DISPLAY", "MINUTES", session.minutes.to_string()),
         ("EMCMOT", "SERVO_PERIOD", period),
         ("QUADRANT", "PREVIEW", session.preview.to_owned()),
         ("PLANT", "RATE", rate),
@@ -93,6 +96,7 @@ pub(crate) fn write(session: &Session, folder: &Path, display: &str) -> Result<(
             values.push((joint, name, format!("{gain:.9}")));
         }
     }
+    fs::copy(sources().join("check/times.hal"), folder.join("times.hal"))?;
     let text = fs::read_to_string(configs.join("machine.ini"))?;
     let text = with_values(&text, &values)?.replace(
         "HALFILE = quadrant.hal",
@@ -133,17 +137,23 @@ pub(crate) fn start(session: &Session, folder: &Path) -> Result<Running> {
     let display = folder.join("headless.py").display().to_string();
     write(session, &folder, &display)?;
     // -r: what is printed goes to the log.
-    spawn(folder, "timeout 100 linuxcnc -r $PWD/machine.ini")
+    let seconds = 100 + 60 * session.minutes;
+    let line = format!("timeout {seconds} linuxcnc -r $PWD/machine.ini");
+    spawn(folder, &line)
 }
 
-/// Starts the component without LinuxCNC: it is unloaded while it drives, and loses an encoder.
-pub(crate) fn start_faults(session: &Session, folder: &Path) -> Result<Running> {
-    let folder = folder.join("faults");
+/// Starts the component without LinuxCNC, by files of the check: `name.hal` runs `name.sh`.
+pub(crate) fn start_halrun(session: &Session, folder: &Path, name: &str) -> Result<Running> {
+    let folder = folder.join(name);
     write(session, &folder, "")?;
-    for name in ["faults.hal", "faults.sh"] {
-        fs::copy(sources().join("check").join(name), folder.join(name))?;
+    for ending in ["hal", "sh"] {
+        let file = format!("{name}.{ending}");
+        fs::copy(sources().join("check").join(&file), folder.join(&file))?;
     }
-    spawn(folder, "timeout 100 halrun -f faults.hal")
+    spawn(
+        folder,
+        &format!("timeout 100 halrun -i machine.ini -f {name}.hal"),
+    )
 }
 
 /// Runs a command in a folder as the user. Temporary files and the control's lock lie below /tmp, shared memory and ports in spaces of

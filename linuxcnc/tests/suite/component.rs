@@ -180,7 +180,7 @@ impl Component {
             axis.voltage = joint.output;
         }
         // SAFETY: as above.
-        unsafe { quadrant_plant_write(self.plant, &self.stage) };
+        unsafe { quadrant_plant_write(self.plant, &mut self.stage) };
     }
 
     /// Runs `ticks` periods.

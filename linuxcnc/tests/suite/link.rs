@@ -1,14 +1,16 @@
 //! The link of a component that ticks.
 
+use std::fs;
 use std::io::Write;
 use std::net::{TcpListener, TcpStream};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use quadrant_host::client::Client;
+use quadrant_host::client::{Client, settings};
 use quadrant_host::machine::TcpTransport;
 use quadrant_link::message::{AxisMode, AxisName, Body};
 
@@ -31,6 +33,10 @@ struct Ticking {
 
 impl Ticking {
     fn start() -> Self {
+        Self::with_store(None)
+    }
+
+    fn with_store(store: Option<PathBuf>) -> Self {
         let port = free_port();
         let [ends, on] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         let (ended, enable) = (Arc::clone(&ends), Arc::clone(&on));
@@ -38,6 +44,7 @@ impl Ticking {
         let thread = thread::spawn(move || {
             let mut component = Component::start(&Parameters {
                 port: port.into(),
+                store,
                 ..Parameters::default()
             });
             ready.send(()).unwrap();
@@ -108,6 +115,22 @@ fn a_host_that_stops_a_joint_that_linuxcnc_leads_switches_it_off_and_shows_it() 
         component.pins.joints[0].fault,
         quadrant_linuxcnc::board::ENDED
     );
+}
+
+#[test]
+fn a_store_that_cannot_be_written_is_shown_on_a_pin() {
+    for is_there in [true, false] {
+        let folder = tempfile::tempdir().unwrap();
+        let below = folder.path().join("below");
+        fs::create_dir(&below).unwrap();
+        let mut ticking = Ticking::with_store(Some(below.join("settings.store")));
+        if !is_there {
+            fs::remove_dir_all(&below).unwrap();
+        }
+        settings::store(&mut ticking.client, "").unwrap();
+        thread::sleep(Duration::from_millis(300));
+        assert_eq!(ticking.end().pins.store_failed, !is_there);
+    }
 }
 
 #[test]
