@@ -48,7 +48,7 @@ pub type Recorded = [[f64; 3]; 2];
 /// Periods after an index pulse in which steps of the voltage are looked for.
 const INDEX_PERIODS: u32 = 10;
 
-/// What an index pulse leaves behind.
+/// Trace that an index pulse leaves behind.
 #[derive(Clone, Copy, Default)]
 struct Index {
     /// Its count, which is zero of the position.

@@ -89,7 +89,7 @@ impl Watch for Progress<'_> {
     }
 }
 
-/// What a commissioning has found, and its PID alone.
+/// Result of a commissioning, and its PID alone.
 pub(crate) type Outcome = Result<(Commissioned, Option<AxisSettings>), CommissionError>;
 
 /// Commissions an axis under test.

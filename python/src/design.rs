@@ -49,7 +49,7 @@ fn gains(gains: Gains) -> PyResult<PidGains> {
     )))
 }
 
-/// What a controller is designed on.
+/// Process that a controller is designed on.
 #[pyclass(module = "quadrant", name = "Process", frozen)]
 #[derive(Debug)]
 pub(crate) struct DesignProcess(Process);

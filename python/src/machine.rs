@@ -43,7 +43,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Longest time for which an interrupted request is waited for.
 const GIVE_UP: Duration = Duration::from_secs(5);
 
-/// Where a machine is.
+/// Place at which a machine is reached.
 enum Place {
     Simulated(Box<StageSetup>, u64, Option<PathBuf>),
     Emulated(PathBuf, Box<StageSetup>, u64, Option<PathBuf>),

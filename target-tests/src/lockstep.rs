@@ -133,7 +133,7 @@ impl ahead::Firmware for Lockstep {
     }
 }
 
-/// What the firmware reads and answers of x, a line a control tick.
+/// File of the counts and words of x, a line a control tick.
 pub(crate) struct WordsFile(BufWriter<File>);
 
 impl WordsFile {

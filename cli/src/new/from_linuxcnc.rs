@@ -23,11 +23,10 @@ const PER_MM: f64 = 1e6;
 const FULL_SCALE_V: f64 = 10.0;
 /// Largest following error that settings allow, mm.
 const MOST_ERROR_MM: f64 = 20.0;
-
 /// Largest growth of that error with the speed, s.
 const MOST_LAG_S: f64 = 1.0;
 
-/// What a configuration gave.
+/// The settings that a configuration gave.
 pub(super) struct Taken {
     pub(super) stage: StageSettings,
     pub(super) axes: Vec<AxisName>,
@@ -270,12 +269,13 @@ impl<'a> Joint<'a> {
         if let (Some(most), Some(least)) = (self.key(&["FERROR"]), self.key(&["MIN_FERROR"])) {
             let [most_mm, least_mm] =
                 [&most, &least].map(|found| (unit_mm * found.value).min(MOST_ERROR_MM));
+            let max_mm = most_mm.max(least_mm);
             limits.following_error_mm = least_mm;
-            limits.following_error_max_mm = most_mm.max(least_mm);
+            limits.following_error_max_mm = max_mm;
             limits.following_error_lag_s = (most_mm / limits.max_velocity_mm_s).min(MOST_LAG_S);
             let path = format!("limits.following_error_mm = {least_mm}");
             lines.push(origin(&path, Some(&least)));
-            let path = format!("limits.following_error_max_mm = {}", most_mm.max(least_mm));
+            let path = format!("limits.following_error_max_mm = {max_mm}");
             lines.push(origin(&path, Some(&most)));
         }
         let pid = &mut axis.feedback.pid;

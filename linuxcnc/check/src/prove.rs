@@ -27,7 +27,7 @@ type Instruction = (String, String);
 struct Code {
     /// Name and instructions of each function, by its address.
     functions: BTreeMap<u64, (String, Vec<Instruction>)>,
-    /// What the loader puts at an address: a function's address (`*ABS*+0x1234`), or the name of one elsewhere.
+    /// Entries of the loader, by their address: a function's address (`*ABS*+0x1234`), or the name of one elsewhere.
     table: HashMap<u64, String>,
 }
 
@@ -74,7 +74,7 @@ impl Code {
             .map(|(start, _)| *start)
     }
 
-    /// What the loader puts at the address in an instruction's comment.
+    /// Entry that the loader puts at the address in an instruction's comment.
     fn loaded(&self, operands: &str) -> Option<&str> {
         let (_, comment) = operands.split_once("# ")?;
         let address = hexadecimal(comment.split_whitespace().next()?)?;

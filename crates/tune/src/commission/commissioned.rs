@@ -31,8 +31,8 @@ pub struct CommissionSettings {
 }
 
 impl Default for CommissionSettings {
-    /// The best PID, and 75 % of the Popov bound, or as much gain as leaves `|S|` within 2.5: what lies beyond the loop is never made
-    /// larger by more than that.
+    /// The best PID, and 75 % of the Popov bound, or less where `|S|` would exceed 2.5: no
+    /// disturbance is amplified by more than that.
     fn default() -> Self {
         Self {
             target: None,

@@ -11,6 +11,7 @@ use quadrant_sim::loop_shape::OpenLoop;
 
 use super::form::Form;
 use super::process::Process;
+use super::search::scaled;
 
 /// Rule by which ko and emax are chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -146,16 +147,6 @@ pub fn gain_within_peak(
         }
     }
     low
-}
-
-/// A PID behind a gain.
-fn scaled(gains: &PidGains, gain: f64) -> PidGains {
-    PidGains {
-        kp_v_per_mm: gain * gains.kp_v_per_mm,
-        ki_v_per_mm_s: gain * gains.ki_v_per_mm_s,
-        kd_v_s_per_mm: gain * gains.kd_v_s_per_mm,
-        ..*gains
-    }
 }
 
 /// Accuracy of [`gain_within_peak`].

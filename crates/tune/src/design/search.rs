@@ -303,7 +303,7 @@ impl Search {
 }
 
 /// Gains times a factor.
-fn scaled(gains: &PidGains, factor: f64) -> PidGains {
+pub(super) fn scaled(gains: &PidGains, factor: f64) -> PidGains {
     PidGains {
         kp_v_per_mm: factor * gains.kp_v_per_mm,
         ki_v_per_mm_s: factor * gains.ki_v_per_mm_s,

@@ -374,8 +374,9 @@ fn holds_outside(candidate: &Candidate, candidates: &[Candidate]) -> bool {
 }
 
 /// The model to use: the simplest of those whose error while sliding is within two per cent of the smallest, or within 0.15 % of
-/// the voltage, and which also reversals do not contradict, nor the ends of the record and of its travel a simpler one. The errors are those on withheld motion; where nothing was withheld of
-/// any model, those on the record of the fit. A model of which nothing could be withheld is not compared with others.
+/// the voltage, which reversals do not contradict, and than which no simpler one is better at the ends of the record and of its travel.
+/// The errors are those on withheld motion; where nothing was withheld of any model, those on the record of the fit. A model of which
+/// nothing could be withheld is not compared with others.
 pub fn recommended(candidates: &[Candidate]) -> Option<&Candidate> {
     let validated = candidates
         .iter()
