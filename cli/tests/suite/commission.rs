@@ -55,7 +55,8 @@ fn a_commissioned_axis_beats_its_pid_and_its_settings_replay() {
         let law = rms.iter().find(|(law, _)| law == name);
         law.unwrap_or_else(|| panic!("{name}: {rms:?}")).1
     };
-    assert!(of("N-PID") < 0.95 * of("PID"), "{rms:?}");
+    // Little: |S| stays below 2.5 at the N-PID's largest gain.
+    assert!(of("N-PID") < 0.98 * of("PID"), "{rms:?}");
     assert!(of(chosen) < 0.1 * of("PID"), "{rms:?}");
     assert!(shown.contains(&format!("Chosen: {chosen}")), "{shown}");
 
