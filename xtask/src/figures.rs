@@ -35,7 +35,7 @@ const SENTENCES: &[(&str, &str)] = &[
     ),
     (
         "docs/tick.md",
-        "it is beyond:\n{cycles: f32.no_cache + converter.no_cache} cycles",
+        "every line is waited for:\n{cycles: f32.no_cache + converter.no_cache} cycles",
     ),
     (
         "docs/tick.md",
