@@ -46,10 +46,6 @@ const SENTENCES: &[(&str, &str)] = &[
         "| {jitter: f32.min} | {jitter: f32.max} | **{jitter: f32.max - f32.min}** |",
     ),
     (
-        "docs/safety.md",
-        "`cargo xtask count`: {count: f32.stages.safety.mean} of {count: f32.total.mean} are in the stage",
-    ),
-    (
         "docs/commands.md",
         "| {count: f32.total.mean} (largest {count: f32.total.max}) | {count: fixed.total.mean} (largest {count: fixed.total.max}) |",
     ),
