@@ -60,7 +60,7 @@ const SENTENCES: &[(&str, &str)] = &[
     ),
     (
         "docs/board-nucleo-f446re.md",
-        "not counted | {cycles: converter.no_wait_states} cycles at most",
+        "is {cycles: converter.no_wait_states} cycles at most in the whole interrupt",
     ),
     (
         "docs/memory.md",
