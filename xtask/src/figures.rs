@@ -35,7 +35,7 @@ const SENTENCES: &[(&str, &str)] = &[
     ),
     (
         "docs/tick.md",
-        "it is beyond:\n{cycles: f32.no_cache + converter.no_cache} cycles",
+        "every line is waited for:\n{cycles: f32.no_cache + converter.no_cache} cycles",
     ),
     (
         "docs/tick.md",
@@ -44,10 +44,6 @@ const SENTENCES: &[(&str, &str)] = &[
     (
         "docs/tick.md",
         "| {jitter: f32.min} | {jitter: f32.max} | **{jitter: f32.max - f32.min}** |",
-    ),
-    (
-        "docs/safety.md",
-        "`cargo xtask count`: {count: f32.stages.safety.mean} of {count: f32.total.mean} are in the stage",
     ),
     (
         "docs/commands.md",
@@ -64,7 +60,7 @@ const SENTENCES: &[(&str, &str)] = &[
     ),
     (
         "docs/board-nucleo-f446re.md",
-        "not counted | {cycles: converter.no_wait_states} cycles at most",
+        "is {cycles: converter.no_wait_states} cycles at most in the whole interrupt",
     ),
     (
         "docs/memory.md",

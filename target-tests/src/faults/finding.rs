@@ -54,7 +54,7 @@ impl Finding {
         }
     }
 
-    /// A row of the table in `docs/safety.md`.
+    /// A row of the table that the command prints.
     pub(crate) fn row(&self, code: FaultCode) -> String {
         let [x, y, z] = self.codes;
         let reaction = match code.reaction() {
