@@ -33,6 +33,10 @@ pub(crate) struct Parameters {
     pub(crate) late: i32,
     /// The feedforward alone.
     pub(crate) feedforward_only: bool,
+    /// Settings in place of the tests' own.
+    pub(crate) settings: Option<StageSettings>,
+    /// Seed of the stage's noise.
+    pub(crate) seed: i32,
 }
 
 /// The settings of the tests: the simulated stage's at the thread's rate.
@@ -74,7 +78,9 @@ impl Component {
     pub(crate) fn try_start(parameters: &Parameters) -> Option<Self> {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("settings.toml");
-        let text = SettingsFile::new(settings()).text(&path).expect("settings");
+        let settings = parameters.settings.clone().unwrap_or_else(settings);
+        let rate_hz = settings.rate_hz;
+        let text = SettingsFile::new(settings).text(&path).expect("settings");
         std::fs::write(&path, text).expect("writes");
         let text = |path: &Path| CString::new(path.to_str().expect("text")).expect("no zero");
         let defaults = text(&path);
@@ -99,15 +105,15 @@ impl Component {
             preview: ptr::null(),
             address: ptr::null(),
             port: parameters.port,
-            rate: RATE_HZ as i32,
+            rate: rate_hz as i32,
             late: parameters.late,
         };
         let plant = QuadrantPlantConfig {
             file: ptr::null(),
             record: ptr::null(),
-            rate: RATE_HZ as i32,
+            rate: rate_hz as i32,
             drive_lag_us: 0,
-            seed: 1,
+            seed: parameters.seed,
             room: 0,
         };
         // SAFETY: all texts end with a zero.
@@ -116,7 +122,7 @@ impl Component {
             board,
             plant,
             pins: QuadrantPins {
-                period_ns: PERIOD_NS,
+                period_ns: (1e9 / rate_hz) as i64,
                 now_ns: 1,
                 ..QuadrantPins::default()
             },
@@ -152,14 +158,19 @@ impl Component {
 
     /// One period: encoders, command, law, amplifiers. The command stands unless the joints are enabled.
     pub(crate) fn step(&mut self, enable: bool) {
-        // SAFETY: both were started, and this is the only thread that uses them.
-        unsafe { quadrant_plant_read(self.plant, &mut self.stage) };
         let was = self.pins.joints[0].enable;
         self.tick = if enable && was { self.tick + 1 } else { 0 };
-        if enable && !was {
+        let (positions, velocities) = Self::command(self.tick);
+        self.step_along(enable, positions, velocities);
+    }
+
+    /// One period along a command that begins where the joints were enabled.
+    pub(crate) fn step_along(&mut self, enable: bool, positions: [f64; 3], velocities: [f64; 3]) {
+        // SAFETY: both were started, and this is the only thread that uses them.
+        unsafe { quadrant_plant_read(self.plant, &mut self.stage) };
+        if enable && !self.pins.joints[0].enable {
             self.start_mm = self.stage.axes.map(|axis| axis.position_fb);
         }
-        let (positions, velocities) = Self::command(self.tick);
         for index in 0..3 {
             let (joint, axis) = (&mut self.pins.joints[index], &self.stage.axes[index]);
             joint.rawcounts = axis.rawcounts;
@@ -174,7 +185,7 @@ impl Component {
         }
         // SAFETY: as above.
         without_allocation(|| unsafe { quadrant_tick(self.board, &mut self.pins) });
-        self.pins.now_ns += PERIOD_NS;
+        self.pins.now_ns += self.pins.period_ns;
         self.stage.enable = self.pins.driven;
         for (axis, joint) in self.stage.axes.iter_mut().zip(&self.pins.joints) {
             axis.voltage = joint.output;

@@ -7,6 +7,7 @@ mod faults;
 mod forbidding;
 mod gains;
 mod header;
+mod homing;
 mod link;
 mod reference;
 mod words;
