@@ -94,9 +94,19 @@ fn guarded(
         response,
         plant,
         mut controller,
-    } = linear_model(test_axis, base, request, &steps, motor, &mut |share| {
-        report(watch, step, share);
-    })?;
+    } = match linear_model(
+        test_axis,
+        base,
+        request,
+        &steps,
+        motor.clone(),
+        &mut |share| {
+            report(watch, step, share);
+        },
+    ) {
+        Ok(found) => found,
+        Err(error) => return velocity_mode::explain(test_axis, base, &motor, error),
+    };
 
     velocity_mode::refuse(&plant.plant, &response)?;
     step += 1;

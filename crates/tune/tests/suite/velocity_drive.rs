@@ -1,8 +1,11 @@
 //! Axes behind an amplifier in velocity mode.
 
+use std::path::Path;
+
 use quadrant_law::units::DacCode;
 use quadrant_settings::StageSettings;
 use quadrant_sim::plant::{SimulatedAxis, StageParameters, VelocityDrive};
+use quadrant_sim::stage_file::StageFile;
 use quadrant_tune::commission::{CommissionError, CommissionSettings, commission};
 use quadrant_tune::test_axis::{SimulatedTestAxis, TestAxis};
 use rayon::prelude::*;
@@ -55,6 +58,32 @@ fn an_amplifier_in_velocity_mode_is_recognised_before_friction_is_measured() {
         assert!((0.6..1.4).contains(&ratio), "{case:?}: {lag_ms}");
         assert_eq!(last, "frequency response", "{case:?}");
     });
+}
+
+#[test]
+fn an_amplifier_in_velocity_mode_is_recognised_of_a_fine_encoder_and_of_a_heavy_slide() {
+    let fine = "[x]\ndrive_lag_ms = 2\nresolution_um = 0.1\n";
+    let heavy = format!("{fine}mass_kg = 40\nforce_n_per_v = 400\ncoulomb_n = 90\n");
+    for text in [fine, &heavy] {
+        let file = StageFile::parse(text, Path::new("mine.toml")).expect("a stage");
+        let mut stage = StageSettings::simulated();
+        stage.axes[0].encoder.resolution_mm = 1e-4;
+        let mut axis = SimulatedTestAxis::under(&stage, 0, file.truth.axes[0].clone(), 1);
+        let base = axis.settings().clone();
+        let (request, mut watch) = (CommissionSettings::default(), |_: &'static str, _: f64| {});
+        let found = commission(&mut axis, &base, &request, &mut watch);
+        let Err(CommissionError::VelocityMode {
+            velocity_mm_s_per_v,
+            lag_ms,
+        }) = found
+        else {
+            panic!("{text}: {:?}", found.map(|found| found.notes()));
+        };
+        let ratio = velocity_mm_s_per_v / 25.0;
+        assert!((ratio - 1.0).abs() < 0.02, "{text}: {velocity_mm_s_per_v}");
+        // Dead time, and what friction takes until the drive's integral has it, are in what open loop shows.
+        assert!((1.0..20.0).contains(&lag_ms), "{text}: {lag_ms}");
+    }
 }
 
 #[test]
