@@ -12,6 +12,8 @@ use crate::bench::Bench;
 
 /// Longest time to an answer, s.
 const TIMEOUT_S: f64 = 5.0;
+/// Time after which a request is repeated, s.
+const REPEAT_S: f64 = 0.03;
 /// Time between two looks at the line, s.
 const LOOK_S: f64 = 0.0002;
 
@@ -42,15 +44,35 @@ impl Client {
     pub fn ask(&mut self, bench: &mut Bench, body: Body) -> Result<Reply> {
         let name = body.name();
         self.begin(bench, body)?;
-        let mut looks = (TIMEOUT_S / LOOK_S) as u32;
-        while looks > 0 {
-            bench.run_for(LOOK_S);
-            if let Some(result) = self.take(bench) {
-                return result.with_context(|| format!("request `{name}`"));
-            }
-            looks -= 1;
+        match self.answer(bench, TIMEOUT_S) {
+            Some(result) => result.with_context(|| format!("request `{name}`")),
+            None => Err(anyhow!("no answer to `{name}` within {TIMEOUT_S} s")),
         }
-        Err(anyhow!("no answer to `{name}` within {TIMEOUT_S} s"))
+    }
+
+    /// Asks for the status up to ten times, as a client may whose request got lost.
+    ///
+    /// # Errors
+    /// No answer to the last one.
+    pub fn status_at_last(&mut self, bench: &mut Bench) -> Result<Status> {
+        for _ in 0..10 {
+            self.begin(bench, Body::Status)?;
+            if let Some(Ok(Reply::Status(status))) = self.answer(bench, REPEAT_S) {
+                return Ok(status);
+            }
+        }
+        Err(anyhow!("no answer to ten requests"))
+    }
+
+    fn answer(&mut self, bench: &mut Bench, limit_s: f64) -> Option<Result<Reply>> {
+        for _ in 0..(limit_s / LOOK_S) as u32 {
+            bench.run_for(LOOK_S);
+            let answer = self.take(bench);
+            if answer.is_some() {
+                return answer;
+            }
+        }
+        None
     }
 
     /// Asks, and does not wait.

@@ -4,8 +4,11 @@ mod clock;
 mod converter;
 mod encoders;
 mod faults;
+mod flood;
+mod inputs;
 mod jog;
 mod start;
+mod store;
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -39,9 +42,13 @@ pub const SCENARIOS: &[Scenario] = scenarios! {
     "start", "clock tree, tick, converter frames, complaints of the models", start::run;
     "encoders", "counts by edges at 200 000 a second, filter, index", encoders::run;
     "jog", "enable, jog and stop three axes behind converter and encoders", jog::run;
+    "store", "settings by the link, stored and found after a reboot", store::reboot;
+    "power-cut", "supply cut while a sector is erased", store::power_cut;
     "hard-fault", "bus error in the control tick of a moving machine", faults::hard_fault;
     "stack-overflow", "recursion without an end in a task", faults::stack_overflow;
+    "inputs", "each safety input of a moving machine", inputs::run;
     "converter", "converter lost in mid-frame", converter::run;
+    "flood", "noise and requests without a pause on the link", flood::run;
     "clock", "8 MHz missing at the start, and lost in motion", clock::run;
 };
 
