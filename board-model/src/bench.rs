@@ -18,7 +18,7 @@ use rigless::symbols::Symbols;
 use rigless::time::VirtualNanos;
 
 use crate::ad5754r::{self, Shared};
-use crate::board::{At, BRAKE, ENABLE, HSE_HZ, Nucleo, SharedLine};
+use crate::board::{At, BRAKE, COUNTER, ENABLE, HSE_HZ, Nucleo, SharedLine, TIMERS};
 use crate::log::Log;
 use crate::stage::{Axis, INDEX_COUNTS, STEP_NS};
 
@@ -92,6 +92,17 @@ impl Ticks {
     }
 }
 
+/// One control tick as a probe at the pins and at the bus of the timers sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct TickRecord {
+    /// Counts that the program has read, x, y, z; those of 16 bits extended.
+    pub counts: [u32; 3],
+    /// Words loaded by the converter, x, y, z.
+    pub codes: [i16; 3],
+    /// Level of the enable line.
+    pub enabled: bool,
+}
+
 /// Everything around the chip, on the model's side.
 #[derive(Debug)]
 pub struct World {
@@ -108,6 +119,8 @@ pub struct World {
     edges: VecDeque<(u64, usize, i64)>,
     /// Pulses under way: time of the end, axis, line, level.
     pulses: Vec<(u64, usize, usize, bool)>,
+    /// True if the encoders have an index.
+    pub index: bool,
     next_step: u64,
     next_log: u64,
     /// Log of the firmware.
@@ -123,7 +136,10 @@ pub struct World {
     /// Restarts: time in ns, cause.
     pub resets: Vec<(u64, ResetCause)>,
     chip: Shared,
-    /// Time at which the converter loses its supply, ns.
+    counts: [u32; 3],
+    /// Control ticks since the start, each complete.
+    pub record: Vec<TickRecord>,
+    /// Addresses whose writes are kept.
     pub trace: Option<std::ops::Range<u64>>,
     /// Writes within `trace`: time, address, value.
     pub traced: Vec<(u64, u64, u64)>,
@@ -143,7 +159,8 @@ impl World {
     fn lines(&self, board: &mut Nucleo, now: VirtualNanos, axis: usize) {
         let [a, b] = quadrature(self.shown[axis]);
         // Half a turn away from the start.
-        let index = (self.shown[axis] - INDEX_COUNTS / 2).rem_euclid(INDEX_COUNTS) == 0;
+        let index =
+            self.index && (self.shown[axis] - INDEX_COUNTS / 2).rem_euclid(INDEX_COUNTS) == 0;
         for (line, level) in [a, b, index].into_iter().enumerate() {
             board.encoder_line(now, axis, line, level);
         }
@@ -161,6 +178,19 @@ impl World {
         let level = quadrature(self.shown[axis])[line];
         board.encoder_line(now, axis, line, !level);
         self.pulses.push((now.0 + ns, axis, line, level));
+    }
+
+    fn note_count(&mut self, axis: usize, read: u32) {
+        let last = &mut self.counts[axis];
+        *last = match axis {
+            0 => read,
+            _ => last.wrapping_add_signed(
+                (read as u16)
+                    .wrapping_sub(*last as u16)
+                    .cast_signed()
+                    .into(),
+            ),
+        };
     }
 
     fn plan_edges(&mut self, board: &mut Nucleo, now: u64) {
@@ -219,6 +249,12 @@ impl Driver<Nucleo> for World {
         };
         let now = access.virtual_time;
         if access.kind == AccessKind::Read {
+            if let Some(axis) = TIMERS
+                .iter()
+                .position(|timer| timer + COUNTER == access.address)
+            {
+                self.note_count(axis, value as u32);
+            }
             if access.address == TICK_COUNTER
                 && let Some(begun) = self.ticks.begun
             {
@@ -234,7 +270,18 @@ impl Driver<Nucleo> for World {
             self.traced.push((now.0, access.address, value));
         }
         match access.address {
-            TICK_STATUS => self.ticks.acknowledge(now.0, access.instruction_count),
+            TICK_STATUS => {
+                if self.ticks.begun.is_some() {
+                    let (counts, codes) = (self.counts, ad5754r::lock(&self.chip).codes());
+                    let enabled = session.board_mut().level(ENABLE);
+                    self.record.push(TickRecord {
+                        counts,
+                        codes,
+                        enabled,
+                    });
+                }
+                self.ticks.acknowledge(now.0, access.instruction_count);
+            }
             WATCHDOG_KEY if access.value & 0xFFFF == 0xAAAA => {
                 if self.feeds.0 != 0 {
                     self.feeds.1 = self.feeds.1.max(now.0 - self.feeds.0);
@@ -556,6 +603,7 @@ fn run(
         shown: [0; 3],
         edges: VecDeque::new(),
         pulses: Vec::new(),
+        index: true,
         next_step: 0,
         next_log: 0,
         log: Log::new(&elf, symbols.get("_SEGGER_RTT").ok())?,
@@ -565,6 +613,8 @@ fn run(
         feeds: (0, 0),
         resets: Vec::new(),
         chip: chip.clone(),
+        counts: [0; 3],
+        record: Vec::new(),
         trace: None,
         traced: Vec::new(),
     };

@@ -53,7 +53,9 @@ const ENCODERS: [[(At, u8); 3]; 3] = [
     [(At(2, 6), 3), (At(2, 7), 3), (At(2, 8), 3)],
 ];
 /// Base addresses of the encoders' timers: TIM2, TIM3, TIM8.
-const TIMERS: [u64; 3] = [0x4000_0000, 0x4000_0400, 0x4001_0400];
+pub const TIMERS: [u64; 3] = [0x4000_0000, 0x4000_0400, 0x4001_0400];
+/// Offset of a timer's counter.
+pub const COUNTER: u64 = 0x24;
 /// The port of /SYNC (12), /LDAC (1) and /CLR (2).
 const CONVERTER_WIRES: [(usize, Wire, u8); 3] =
     [(1, Wire::Bus, 12), (0, Wire::Ldac, 1), (0, Wire::Clr, 2)];
@@ -194,7 +196,7 @@ impl Nucleo {
     /// The count of an encoder's timer, and the count captured at its index.
     pub fn counter(&mut self, now: VirtualNanos, axis: usize) -> (u32, u32) {
         (
-            self.peek(now, TIMERS[axis] + 0x24),
+            self.peek(now, TIMERS[axis] + COUNTER),
             self.peek(now, TIMERS[axis] + 0x3C),
         )
     }

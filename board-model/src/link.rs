@@ -127,13 +127,22 @@ impl Client {
         }
     }
 
-    /// Writes all settings to the draft and applies it.
+    /// Writes settings to the draft where they differ from those that it has, and applies it.
     ///
     /// # Errors
     /// A refusal.
-    pub fn load(&mut self, bench: &mut Bench, settings: &StageSettings) -> Result<()> {
-        for (path, value) in values(settings)? {
-            self.ask(bench, Body::Settings(SettingsRequest::Set { path, value }))?;
+    pub fn load(
+        &mut self,
+        bench: &mut Bench,
+        settings: &StageSettings,
+        present: &StageSettings,
+    ) -> Result<()> {
+        let present = values(present)?;
+        for setting in values(settings)? {
+            if !present.contains(&setting) {
+                let (path, value) = setting;
+                self.ask(bench, Body::Settings(SettingsRequest::Set { path, value }))?;
+            }
         }
         self.ask(bench, Body::Settings(SettingsRequest::Apply))?;
         Ok(())

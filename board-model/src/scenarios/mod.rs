@@ -9,6 +9,7 @@ mod inputs;
 mod jog;
 mod start;
 mod store;
+mod words;
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -50,6 +51,7 @@ pub const SCENARIOS: &[Scenario] = scenarios! {
     "converter", "converter lost in mid-frame", converter::run;
     "flood", "noise and requests without a pause on the link", flood::run;
     "clock", "8 MHz missing at the start, and lost in motion", clock::run;
+    "words", "every converter word of 10 s of motion beside the reference model's", words::run;
 };
 
 /// Longest start, s (docs/board-nucleo-f446re.md: 1.8 s with stored settings).
@@ -85,7 +87,11 @@ fn commissioned(image: &Path) -> Result<Vec<u8>> {
     }
     let mut bench = started(image, None)?;
     let mut client = Client::open(&mut bench)?;
-    client.load(&mut bench, &StageSettings::simulated())?;
+    client.load(
+        &mut bench,
+        &StageSettings::simulated(),
+        &StageSettings::default(),
+    )?;
     client.store(&mut bench, "board-run")?;
     Ok(STORED.get_or_init(|| bench.settings_flash()).clone())
 }
