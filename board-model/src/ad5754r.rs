@@ -184,6 +184,15 @@ impl Ad5754r {
         self.powered = true;
     }
 
+    /// A wire changes its level.
+    pub fn edge(&mut self, wire: Wire, high: bool, now: u64) {
+        match wire {
+            Wire::Bus => self.set_sync(high, now),
+            Wire::Ldac => self.set_ldac(high, now),
+            Wire::Clr => self.set_clr(high, now),
+        }
+    }
+
     fn complain(&mut self, now: u64, text: impl Into<String>) {
         if self.complaints.len() < 20 {
             self.complaints.push((now, text.into()));
@@ -197,7 +206,8 @@ impl Ad5754r {
         }
     }
 
-    fn byte(&mut self, mosi: u32, bits: u32, now: u64) -> u32 {
+    /// Bits have crossed the bus; returns those of SDO.
+    pub fn byte(&mut self, mosi: u32, bits: u32, now: u64) -> u32 {
         if let Some(left) = &mut self.fails_after_bytes {
             *left = left.saturating_sub(1);
             if *left == 0 {
@@ -406,12 +416,7 @@ impl End {
     }
 
     fn edge(&self, high: bool, now: u64) {
-        let mut chip = lock(&self.chip);
-        match self.wire {
-            Wire::Bus => chip.set_sync(high, now),
-            Wire::Ldac => chip.set_ldac(high, now),
-            Wire::Clr => chip.set_clr(high, now),
-        }
+        lock(&self.chip).edge(self.wire, high, now);
     }
 }
 

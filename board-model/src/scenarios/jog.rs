@@ -6,7 +6,7 @@ use anyhow::Result;
 use quadrant_link::message::{AxisName, Body, MachineState};
 
 use crate::report::Report;
-use crate::scenarios::{driving, row_off};
+use crate::scenarios::{WATCHDOG_S, driving, row_off};
 use crate::stage::COUNT_MM;
 
 /// Velocities of x, y, z, mm/s.
@@ -15,6 +15,7 @@ const VELOCITIES: [f64; 3] = [20.0, -15.0, 8.0];
 pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
     let (mut bench, mut client) = driving(image)?;
     bench.ticks();
+    bench.with(|world, _, _| world.feeds.1 = 0);
     for (axis, velocity_mm_s) in AxisName::ALL.into_iter().zip(VELOCITIES) {
         client.ask(
             &mut bench,
@@ -81,6 +82,14 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
         client
             .status(&mut bench)
             .map(|status| MachineState::as_str(status.state))?,
+    );
+    let longest = bench.with(|world, _, _| world.feeds.1) as f64 * 1e-6;
+    report.within(
+        "longest time between two feeds of the watchdog",
+        0.0,
+        WATCHDOG_S[0] * 1e3,
+        longest,
+        "ms",
     );
     let ticks = bench.ticks();
     report.equal(

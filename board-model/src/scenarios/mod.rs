@@ -7,6 +7,7 @@ mod faults;
 mod flood;
 mod inputs;
 mod jog;
+mod model;
 mod start;
 mod store;
 mod words;
@@ -40,10 +41,12 @@ macro_rules! scenarios {
 
 /// All scenarios, in the order of a run.
 pub const SCENARIOS: &[Scenario] = scenarios! {
+    "model", "the converter's model: each violated time or format is a complaint", model::run;
     "start", "clock tree, tick, converter frames, complaints of the models", start::run;
     "encoders", "counts by edges at 200 000 a second, filter, index", encoders::run;
     "jog", "enable, jog and stop three axes behind converter and encoders", jog::run;
     "store", "settings by the link, stored and found after a reboot", store::reboot;
+    "erase", "encoders turned by hand while a sector is erased", store::erase;
     "power-cut", "supply cut while a sector is erased", store::power_cut;
     "hard-fault", "bus error in the control tick of a moving machine", faults::hard_fault;
     "stack-overflow", "recursion without an end in a task", faults::stack_overflow;

@@ -9,7 +9,8 @@ use quadrant_settings::StageSettings;
 use crate::bench::Bench;
 use crate::link::{Client, provenance};
 use crate::report::Report;
-use crate::scenarios::{commissioned, row_fault, runs, started};
+use crate::scenarios::{WATCHDOG_S, commissioned, row_fault, runs, started};
+use crate::stage::COUNT_MM;
 
 /// FLASH_CR.
 const FLASH_CONTROL: u64 = 0x4002_3C10;
@@ -67,6 +68,55 @@ pub(super) fn reboot(image: &Path, report: &mut Report) -> Result<()> {
     );
     report.equal("origin", "a second set".into(), client.origin(&mut bench)?);
     row_fault(&mut bench, &mut client, report, "fault", "none")?;
+    report.none("complaints of the models", &bench.complaints());
+    Ok(())
+}
+
+/// The watchdog's shortest time, ms.
+const WATCHDOG_MS: f64 = WATCHDOG_S[0] * 1e3;
+/// Speeds at which hands turn the encoders, counts/s: counters of 16 bits pass their end every 0.3 s.
+const TURNED: [f64; 3] = [150_000.0, -200_000.0, 180_000.0];
+
+pub(super) fn erase(image: &Path, report: &mut Report) -> Result<()> {
+    let mut bench = started(image, Some(&commissioned(image)?))?;
+    let mut client = Client::open(&mut bench)?;
+    bench.with(|world, _, _| world.trace = Some(FLASH_CONTROL..FLASH_CONTROL + 4));
+    let before = client.status(&mut bench)?;
+    let mut erased = false;
+    for number in 1..8 {
+        if store_until_erasure(&mut bench, &mut client, &format!("set {number}"))?.is_some() {
+            erased = true;
+            break;
+        }
+    }
+    report.equal("a sector is erased by one of seven stores", true, erased);
+    bench.with(|world, _, _| world.feeds.1 = 0);
+    bench.spin(TURNED);
+    let answered = bench.run_while(STORE_S, 0.001, |bench| client.take(bench).is_some());
+    bench.spin([0.0; 3]);
+    bench.run_for(0.02);
+    report.equal("the store is answered", true, answered);
+    let (longest, resets) = bench.with(|world, _, _| (world.feeds.1, world.resets.len()));
+    report.within(
+        "longest time between two feeds of the watchdog",
+        0.0,
+        WATCHDOG_MS,
+        longest as f64 * 1e-6,
+        "ms",
+    );
+    report.equal("resets", 0, resets);
+    let after = client.status(&mut bench)?;
+    let shown = bench.with(|world, _, _| world.shown);
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let moved = after.axes[axis].position_mm - before.axes[axis].position_mm;
+        let turned = shown[axis] as f64 * COUNT_MM;
+        report.row(
+            &format!("{name}: position after {} counts", shown[axis]),
+            format!("{turned:.4} mm"),
+            format!("{moved:.4} mm"),
+            (moved - turned).abs() < 1e-9,
+        );
+    }
     report.none("complaints of the models", &bench.complaints());
     Ok(())
 }
