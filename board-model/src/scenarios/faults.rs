@@ -17,8 +17,12 @@ use crate::scenarios::{NEXT_TICK_S, WATCHDOG_S, driving, row_fault, row_off, run
 const TICK_STATUS: u64 = 0x4000_1410;
 /// Handler of a task.
 const TASK: &str = "DISPATCHER_1";
+/// Time within which the task runs, s.
+const TASK_PERIOD_S: f64 = 1e-3;
 /// `push {r4-r7, lr}` and a branch to it.
-const RECURSION: u64 = 0xE7FD_B5F0;
+const RECURSION: [u32; 1] = [0xE7FD_B5F0];
+/// Writes NMIPENDSET, bit 31 of ICSR (0xE000ED04), and loops: movw, movt, mov.w, str, b.
+const PEND_NMI: [u32; 4] = [0x5004_F64E, 0x0000_F2CE, 0x4100_F04F, 0xE7FE_6001];
 
 /// A machine that jogs x.
 fn jogging(image: &Path) -> Result<(Bench, Client)> {
@@ -35,9 +39,15 @@ fn jogging(image: &Path) -> Result<(Bench, Client)> {
 }
 
 /// Rows of what follows the end of the firmware: outputs, watchdog, the next start.
-fn aftermath(bench: &mut Bench, report: &mut Report, since: u64, fault: &str) -> Result<()> {
+fn aftermath(
+    bench: &mut Bench,
+    report: &mut Report,
+    since: u64,
+    off_s: f64,
+    fault: &str,
+) -> Result<()> {
     bench.run_for(0.002);
-    row_off(bench, report, "enable line", since, NEXT_TICK_S);
+    row_off(bench, report, "enable line", since, off_s);
     report.equal(
         "/CLR",
         "low",
@@ -111,36 +121,51 @@ pub(super) fn hard_fault(image: &Path, report: &mut Report) -> Result<()> {
     let (mut bench, _) = jogging(image)?;
     let since = bench.now();
     bench.with_session(|_, session, _, _| session.fail_next(TICK_STATUS, TICK_STATUS + 4));
-    aftermath(&mut bench, report, since, "20 hard-fault")
+    aftermath(&mut bench, report, since, NEXT_TICK_S, "20 hard-fault")
+}
+
+/// Replaces the first instructions of a task, lets it run, and puts them back for the next start. Returns the instant of the
+/// replacement.
+fn run_instead(bench: &mut Bench, image: &Path, code: &'static [u32]) -> Result<u64> {
+    let since = bench.now();
+    let elf = std::fs::read(image)?;
+    let symbols = rigless::symbols::Symbols::read(&elf, |address| address & !1)?;
+    let task = symbols.get(TASK)? & !1;
+    let mut old = Vec::new();
+    for (address, &word) in (task..).step_by(4).zip(code) {
+        old.push((
+            address,
+            bench.with_session(move |_, _, host, _| host.read(address, Width::W32))?,
+        ));
+        bench.with_session(move |_, _, host, _| host.program(address, Width::W32, word.into()))?;
+    }
+    bench.run_for(TASK_PERIOD_S);
+    for (address, word) in old {
+        bench.with_session(move |_, _, host, _| host.program(address, Width::W32, word))?;
+    }
+    Ok(since)
 }
 
 pub(super) fn stack_overflow(image: &Path, report: &mut Report) -> Result<()> {
     let (mut bench, _) = jogging(image)?;
-    let since = bench.now();
-    let elf = std::fs::read(image)?;
-    let symbols = rigless::symbols::Symbols::read(&elf, |address| address & !1)?;
-    let task = symbols.get(TASK)?;
-    bench.with_session(move |_, _, host, _| host.program(task & !1, Width::W32, RECURSION))?;
-    // The task runs once a millisecond.
-    let until_runs = 1e-3;
-    bench.run_for(until_runs);
-    row_off(
+    let since = run_instead(&mut bench, image, &RECURSION)?;
+    aftermath(
         &mut bench,
         report,
-        "enable line, with the millisecond until the task runs",
         since,
-        until_runs + NEXT_TICK_S,
-    );
-    // The task is whole again for the next start.
-    let bytes = rigless::image::Image::read(image, None)?;
-    let old = bytes.segments().find_map(|(at, bytes)| {
-        let from = usize::try_from((task & !1).checked_sub(at)?).ok()?;
-        Some(u32::from_le_bytes(
-            bytes.get(from..from + 4)?.try_into().ok()?,
-        ))
-    });
-    let old = u64::from(old.unwrap_or_default());
-    bench.with_session(move |_, _, host, _| host.program(task & !1, Width::W32, old))?;
-    let fell = bench.with(|world, _, _| world.enables.last().map_or(0, |change| change.0));
-    aftermath(&mut bench, report, fell, "20 hard-fault")
+        TASK_PERIOD_S + NEXT_TICK_S,
+        "20 hard-fault",
+    )
+}
+
+pub(super) fn nmi(image: &Path, report: &mut Report) -> Result<()> {
+    let (mut bench, _) = jogging(image)?;
+    let since = run_instead(&mut bench, image, &PEND_NMI)?;
+    aftermath(
+        &mut bench,
+        report,
+        since,
+        TASK_PERIOD_S + NEXT_TICK_S,
+        "20 hard-fault",
+    )
 }

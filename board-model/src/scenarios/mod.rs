@@ -50,6 +50,7 @@ pub const SCENARIOS: &[Scenario] = scenarios! {
     "power-cut", "supply cut while a sector is erased", store::power_cut;
     "hard-fault", "bus error in the control tick of a moving machine", faults::hard_fault;
     "stack-overflow", "recursion without an end in a task", faults::stack_overflow;
+    "nmi", "the interrupt of the clock security system", faults::nmi;
     "inputs", "each safety input of a moving machine", inputs::run;
     "converter", "converter lost in mid-frame", converter::run;
     "flood", "noise and requests without a pause on the link", flood::run;
