@@ -196,9 +196,9 @@ impl World {
     fn plan_edges(&mut self, board: &mut Nucleo, now: u64) {
         let enabled = board.level(ENABLE);
         let volts = ad5754r::lock(&self.chip).volts();
-        for axis in 0..3 {
+        for (axis, volts) in volts.into_iter().enumerate() {
             let target = if self.plant {
-                self.axes[axis].step(if enabled { volts[axis] } else { 0.0 });
+                self.axes[axis].step(if enabled { volts } else { 0.0 });
                 self.axes[axis].count()
             } else {
                 self.spun[axis] += self.spin[axis] * STEP_NS as f64 * 1e-9;

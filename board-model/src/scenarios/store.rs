@@ -121,8 +121,11 @@ pub(super) fn erase(image: &Path, report: &mut Report) -> Result<()> {
     Ok(())
 }
 
+/// A byte of the sector by its offset and what was there.
+type Left = fn(usize, u8) -> u8;
+
 /// State of the sector that a cut erasure leaves.
-const LEFT: [(&str, fn(usize, u8) -> u8); 4] = [
+const LEFT: [(&str, Left); 4] = [
     ("as it was", |_, old| old),
     ("erased in its lower half", |at, old| {
         if at < SECTOR / 2 { 0xFF } else { old }

@@ -77,8 +77,7 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
         plan: job
             .plan
             .build(&job.stage)
-            .map_err(|error| anyhow!("{error}"))?
-            .into(),
+            .map_err(|error| anyhow!("{error}"))?,
     };
     let flash = commissioned(image)?;
     let mut bench = started(image, Some(&flash))?;
