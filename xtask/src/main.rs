@@ -2,6 +2,7 @@
 //! package `target-tests` what runs an image.
 #![forbid(unsafe_code)]
 
+mod board_run;
 mod documented;
 mod figures;
 mod frames;
@@ -69,6 +70,8 @@ enum Verb {
     Emulate(Forwarded),
     /// Start the reference board's image in QEMU's model of a near relative of its chip
     BoardSmoke(Forwarded),
+    /// Run the reference board's image on a model of its chip that others wrote (the first time builds it, 7 to 10 min)
+    BoardRun(Forwarded),
     /// Inject every fault into the emulated firmware, and report how it was found
     Faults(Forwarded),
     /// Count the instructions of one control tick, by stage and by kind of tick
@@ -198,6 +201,7 @@ fn run(cli: Cli) -> Result<bool> {
         }
         Verb::Emulate(args) => forward(toolchain()?, "emulate", args)?,
         Verb::BoardSmoke(args) => forward(toolchain()?, "board-smoke", args)?,
+        Verb::BoardRun(args) => board_run::run(cli.toolchain, args.options)?,
         Verb::Faults(args) => forward(toolchain()?, "faults", args)?,
         Verb::Count(args) => forward(toolchain()?, "count", args)?,
         Verb::Cycles(args) => forward(toolchain()?, "cycles", args)?,

@@ -1,0 +1,101 @@
+//! The reference board's image on a chip model that others wrote: see README.md.
+
+mod ad5754r;
+mod bench;
+mod board;
+mod link;
+mod log;
+mod report;
+mod scenarios;
+mod stage;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+use clap::Parser;
+
+use crate::report::Report;
+use crate::scenarios::{SCENARIOS, Scenario};
+
+/// Run the reference board's image on a model of its chip, and compare what it does with manuals and documentation.
+#[derive(Parser)]
+#[command(name = "cargo xtask board-run", bin_name = "cargo xtask board-run")]
+struct Options {
+    /// The image
+    #[arg(long)]
+    image: PathBuf,
+    /// Names the scenarios and stops
+    #[arg(long)]
+    list: bool,
+    /// Runs the scenarios of this name only; may be repeated
+    #[arg(long, value_name = "NAME")]
+    only: Vec<String>,
+    /// Prints the firmware's log, too
+    #[arg(long)]
+    log: bool,
+}
+
+fn main() -> ExitCode {
+    let options = Options::parse();
+    if options.list {
+        for Scenario { name, about, .. } in SCENARIOS {
+            println!("{name:<16} {about}");
+        }
+        return ExitCode::SUCCESS;
+    }
+    let known = |name: &&String| {
+        SCENARIOS
+            .iter()
+            .all(|scenario| scenario.name != name.as_str())
+    };
+    if let Some(name) = options.only.iter().find(known) {
+        eprintln!("error: no scenario is called {name}; `cargo xtask board-run --list` names all");
+        return ExitCode::FAILURE;
+    }
+    let chosen = SCENARIOS
+        .iter()
+        .filter(|s| options.only.is_empty() || options.only.iter().any(|n| n == s.name));
+    log::SHOWN.store(options.log, Ordering::Relaxed);
+    let started = Instant::now();
+    let (mut rows, mut failed) = (0, 0);
+    for scenario in chosen {
+        let report = run(scenario, &options);
+        rows += report.rows.len();
+        failed += report.rows.iter().filter(|row| !row.3).count();
+    }
+    println!(
+        "{rows} rows, {failed} not as expected, {:.0} s",
+        started.elapsed().as_secs_f64()
+    );
+    if failed == 0 && rows > 0 {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
+}
+
+/// Runs a scenario and prints its rows.
+fn run(scenario: &Scenario, options: &Options) -> Report {
+    let started = Instant::now();
+    let mut report = Report::default();
+    if let Err(error) = (scenario.run)(&options.image, &mut report) {
+        report.row(
+            "the scenario itself",
+            "runs to its end",
+            format!("{error:#}"),
+            false,
+        );
+    }
+    println!(
+        "{} ({:.1} s)",
+        scenario.name,
+        started.elapsed().as_secs_f64()
+    );
+    for (done, expected, measured, passes) in &report.rows {
+        let verdict = if *passes { "ok  " } else { "FAIL" };
+        println!("  {verdict} {done}: expected {expected}; measured {measured}");
+    }
+    report
+}

@@ -1,0 +1,98 @@
+//! The 8 MHz of the debug probe, missing and lost.
+
+use std::path::Path;
+
+use anyhow::Result;
+use quadrant_link::message::{AxisName, Body};
+
+use rigless::device::ResetCause;
+
+use crate::ad5754r;
+use crate::bench::Bench;
+use crate::board::ENABLE;
+use crate::report::Report;
+use crate::scenarios::{WATCHDOG_S, driving, row_off};
+
+pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
+    let mut bench = Bench::start_with_clock(image, None, 0);
+    bench.run_for(2.0);
+    report.equal(
+        "no 8 MHz at the start: control ticks in 2 s",
+        0,
+        bench.ticks().count,
+    );
+    let enabled = bench
+        .with(|world, board, _| board.level(ENABLE) || world.enables.iter().any(|change| change.1));
+    report.equal(
+        "no 8 MHz at the start: enable line",
+        "low",
+        if enabled { "high" } else { "low" },
+    );
+    report.equal(
+        "no 8 MHz at the start: /CLR",
+        "low",
+        if ad5754r::lock(&bench.chip).is_clear_released() {
+            "high"
+        } else {
+            "low"
+        },
+    );
+    drop(bench);
+
+    let (mut bench, mut client) = driving(image)?;
+    client.ask(
+        &mut bench,
+        Body::Jog {
+            axis: AxisName::X,
+            velocity_mm_s: 20.0,
+        },
+    )?;
+    bench.run_for(0.1);
+    let since = bench.now();
+    bench.with(|_, board, now| {
+        board.mcu.drive_clocks(now, |rcc, registers, context| {
+            rcc.fail_hse(registers, context)
+        });
+        board.mcu.rcc.attach_crystals(0, 0);
+    });
+    bench.run_for(0.05);
+    // The chip model does not raise the NMI: see the scenario `nmi`.
+    row_off(
+        &mut bench,
+        report,
+        "8 MHz lost in motion, without the NMI",
+        since,
+        WATCHDOG_S[1],
+    );
+    let resets = bench.with(|world, _, _| {
+        world
+            .resets
+            .iter()
+            .map(|reset| format!("{:?}", reset.1))
+            .collect::<Vec<_>>()
+    });
+    report.equal(
+        "8 MHz lost: reset by",
+        format!("{:?}", ResetCause::Model("IWDG")),
+        resets.join(" "),
+    );
+    bench.ticks();
+    bench.run_for(1.0);
+    report.equal(
+        "8 MHz still away: control ticks in 1 s",
+        0,
+        bench.ticks().count,
+    );
+    let (on, enables) = bench.with(|world, board, _| {
+        (
+            board.level(ENABLE),
+            world.enables.last().map(|change| change.1),
+        )
+    });
+    report.equal(
+        "8 MHz still away: enable line low",
+        true,
+        !on && enables == Some(false),
+    );
+    Ok(())
+}

@@ -1,0 +1,62 @@
+//! The converter lost in mid-frame.
+
+use std::path::Path;
+
+use anyhow::Result;
+use quadrant_link::message::{AxisName, Body};
+
+use crate::ad5754r;
+use crate::report::Report;
+use crate::scenarios::{driving, row_fault, row_off};
+
+/// From the loss to the disabled amplifiers, s: a difference is found within four ticks (docs/board-nucleo-f446re.md), and a tick's computation.
+const FOUND_S: f64 = 500e-6;
+
+pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
+    let (mut bench, mut client) = driving(image)?;
+    client.ask(
+        &mut bench,
+        Body::Jog {
+            axis: AxisName::X,
+            velocity_mm_s: 20.0,
+        },
+    )?;
+    bench.run_for(0.1);
+    // 15 bytes a tick: within the second frame of the writing.
+    ad5754r::lock(&bench.chip).fails_after_bytes = Some(5);
+    let since = bench.now();
+    bench.run_for(0.002);
+    row_off(
+        &mut bench,
+        report,
+        "supply of the converter lost after 5 bytes",
+        since,
+        FOUND_S,
+    );
+    let released = ad5754r::lock(&bench.chip).is_clear_released();
+    report.equal("/CLR", "low", if released { "high" } else { "low" });
+    row_fault(
+        &mut bench,
+        &mut client,
+        report,
+        "fault",
+        "15 output-mismatch x",
+    )?;
+    ad5754r::lock(&bench.chip).power_on();
+    bench.run_for(0.2);
+    let volts = ad5754r::lock(&bench.chip).volts();
+    report.equal(
+        "outputs of the converter that is back, V",
+        "0 0 0".into(),
+        volts.map(|v| v.to_string()).join(" "),
+    );
+    let _ = client.ask(&mut bench, Body::ResetFault);
+    let _ = client.ask(&mut bench, Body::Enable);
+    bench.run_for(0.01);
+    report.equal(
+        "`enable` with a converter that was not set up",
+        false,
+        bench.with(|_, board, _| board.level(crate::board::ENABLE)),
+    );
+    Ok(())
+}

@@ -1,0 +1,171 @@
+//! Faults of the processor.
+
+use std::path::Path;
+
+use anyhow::{Result, ensure};
+use quadrant_link::message::{AxisName, Body};
+use rigless::device::ResetCause;
+use rigless::soc::Width;
+
+use crate::ad5754r;
+use crate::bench::Bench;
+use crate::link::Client;
+use crate::report::Report;
+use crate::scenarios::{NEXT_TICK_S, WATCHDOG_S, driving, row_fault, row_off, runs};
+
+/// TIM7_SR, which every control tick writes.
+const TICK_STATUS: u64 = 0x4000_1410;
+/// Handler of a task.
+const TASK: &str = "DISPATCHER_1";
+/// Time within which the task runs, s.
+const TASK_PERIOD_S: f64 = 1e-3;
+/// `push {r4-r7, lr}` and a branch to it.
+const RECURSION: [u32; 1] = [0xE7FD_B5F0];
+/// Writes NMIPENDSET, bit 31 of ICSR (0xE000ED04), and loops: movw, movt, mov.w, str, b.
+const PEND_NMI: [u32; 4] = [0x5004_F64E, 0x0000_F2CE, 0x4100_F04F, 0xE7FE_6001];
+
+/// A machine that jogs x.
+fn jogging(image: &Path) -> Result<(Bench, Client)> {
+    let (mut bench, mut client) = driving(image)?;
+    client.ask(
+        &mut bench,
+        Body::Jog {
+            axis: AxisName::X,
+            velocity_mm_s: 20.0,
+        },
+    )?;
+    bench.run_for(0.2);
+    Ok((bench, client))
+}
+
+/// Rows of what follows the end of the firmware: outputs, watchdog, the next start.
+fn aftermath(
+    bench: &mut Bench,
+    report: &mut Report,
+    since: u64,
+    off_s: f64,
+    fault: &str,
+) -> Result<()> {
+    bench.run_for(0.002);
+    row_off(bench, report, "enable line", since, off_s);
+    report.equal(
+        "/CLR",
+        "low",
+        if ad5754r::lock(&bench.chip).is_clear_released() {
+            "high"
+        } else {
+            "low"
+        },
+    );
+    let fed = bench.with(|world, _, _| world.feeds.0);
+    bench.run_for(0.03);
+    let reset = bench.with(|world, _, _| world.resets.first().copied());
+    let measured = reset.map_or(0.0, |reset| (reset.0 - fed) as f64 * 1e-9);
+    report.row(
+        "watchdog after its last feed",
+        format!(
+            "{:.1} to {:.1} ms",
+            WATCHDOG_S[0] * 1e3,
+            WATCHDOG_S[1] * 1e3
+        ),
+        format!("{:.2} ms", measured * 1e3),
+        (WATCHDOG_S[0]..=WATCHDOG_S[1]).contains(&measured),
+    );
+    report.equal(
+        "source of the reset",
+        format!("{:?}", ResetCause::Model("IWDG")),
+        format!("{:?}", reset.map_or(ResetCause::Core, |reset| reset.1)),
+    );
+    ensure!(
+        runs(bench),
+        "no control tick after the reset; log {:#?}",
+        bench.log()
+    );
+    let log = bench.log();
+    let says = log
+        .iter()
+        .rev()
+        .find(|line| line.contains("started by"))
+        .cloned()
+        .unwrap_or_default();
+    report.row(
+        "reset cause in the log",
+        "started by watchdog",
+        &says,
+        says.contains("started by watchdog"),
+    );
+    let mut client = Client::open(bench)?;
+    row_fault(bench, &mut client, report, "fault after the reset", fault)?;
+    let refused = client.ask(bench, Body::Enable).is_err() || {
+        bench.run_for(0.01);
+        !bench.with(|_, board, _| board.level(crate::board::ENABLE))
+    };
+    report.equal(
+        "`enable` before the fault is reset is refused",
+        true,
+        refused,
+    );
+    client.ask(bench, Body::ResetFault)?;
+    bench.run_for(0.01);
+    client.ask(bench, Body::Enable)?;
+    bench.run_for(0.01);
+    report.equal(
+        "enabled after `reset`",
+        true,
+        bench.with(|_, board, _| board.level(crate::board::ENABLE)),
+    );
+    Ok(())
+}
+
+pub(super) fn hard_fault(image: &Path, report: &mut Report) -> Result<()> {
+    let (mut bench, _) = jogging(image)?;
+    let since = bench.now();
+    bench.with_session(|_, session, _, _| session.fail_next(TICK_STATUS, TICK_STATUS + 4));
+    aftermath(&mut bench, report, since, NEXT_TICK_S, "20 hard-fault")
+}
+
+/// Replaces the first instructions of a task, lets it run, and puts them back for the next start. Returns the instant of the
+/// replacement.
+fn run_instead(bench: &mut Bench, image: &Path, code: &'static [u32]) -> Result<u64> {
+    let since = bench.now();
+    let elf = std::fs::read(image)?;
+    let symbols = rigless::symbols::Symbols::read(&elf, |address| address & !1)?;
+    let task = symbols.get(TASK)? & !1;
+    let mut old = Vec::new();
+    for (address, &word) in (task..).step_by(4).zip(code) {
+        old.push((
+            address,
+            bench.with_session(move |_, _, host, _| host.read(address, Width::W32))?,
+        ));
+        bench.with_session(move |_, _, host, _| host.program(address, Width::W32, word.into()))?;
+    }
+    bench.run_for(TASK_PERIOD_S);
+    for (address, word) in old {
+        bench.with_session(move |_, _, host, _| host.program(address, Width::W32, word))?;
+    }
+    Ok(since)
+}
+
+pub(super) fn stack_overflow(image: &Path, report: &mut Report) -> Result<()> {
+    let (mut bench, _) = jogging(image)?;
+    let since = run_instead(&mut bench, image, &RECURSION)?;
+    aftermath(
+        &mut bench,
+        report,
+        since,
+        TASK_PERIOD_S + NEXT_TICK_S,
+        "20 hard-fault",
+    )
+}
+
+pub(super) fn nmi(image: &Path, report: &mut Report) -> Result<()> {
+    let (mut bench, _) = jogging(image)?;
+    let since = run_instead(&mut bench, image, &PEND_NMI)?;
+    aftermath(
+        &mut bench,
+        report,
+        since,
+        TASK_PERIOD_S + NEXT_TICK_S,
+        "20 hard-fault",
+    )
+}

@@ -1,0 +1,164 @@
+//! Scenarios: what is done to the board, and what manuals and documentation say that it does.
+
+mod clock;
+mod converter;
+mod encoders;
+mod faults;
+mod flood;
+mod inputs;
+mod jog;
+mod model;
+mod start;
+mod store;
+mod words;
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use anyhow::{Result, anyhow, ensure};
+use quadrant_link::message::{Body, MachineState, Reply};
+use quadrant_settings::StageSettings;
+
+use crate::bench::Bench;
+use crate::link::Client;
+use crate::report::Report;
+
+/// A scenario.
+pub struct Scenario {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// Subject.
+    pub about: &'static str,
+    /// Runs it on an image.
+    pub run: fn(&Path, &mut Report) -> Result<()>,
+}
+
+macro_rules! scenarios {
+    ($($name:literal, $about:literal, $run:path;)*) => {
+        &[$(Scenario { name: $name, about: $about, run: $run }),*]
+    };
+}
+
+/// All scenarios, in the order of a run.
+pub const SCENARIOS: &[Scenario] = scenarios! {
+    "model", "the converter's model: each violated time or format is a complaint", model::run;
+    "start", "clock tree, tick, converter frames, complaints of the models", start::run;
+    "encoders", "counts by edges at 200 000 a second, filter, index", encoders::run;
+    "jog", "enable, jog and stop three axes behind converter and encoders", jog::run;
+    "store", "settings by the link, stored and found after a reboot", store::reboot;
+    "erase", "encoders turned by hand while a sector is erased", store::erase;
+    "power-cut", "supply cut while a sector is erased", store::power_cut;
+    "hard-fault", "bus error in the control tick of a moving machine", faults::hard_fault;
+    "stack-overflow", "recursion without an end in a task", faults::stack_overflow;
+    "nmi", "the interrupt of the clock security system", faults::nmi;
+    "inputs", "each safety input of a moving machine", inputs::run;
+    "converter", "converter lost in mid-frame", converter::run;
+    "flood", "noise and requests without a pause on the link", flood::run;
+    "clock", "8 MHz missing at the start, and lost in motion", clock::run;
+    "words", "every converter word of 10 s of motion beside the reference model's", words::run;
+};
+
+/// Longest start, s (docs/board-nucleo-f446re.md: 1.8 s with stored settings).
+const START_S: f64 = 2.0;
+/// From the cause of a fault to the disabled amplifiers, at most, s: the next tick, and its computation.
+const NEXT_TICK_S: f64 = 200e-6;
+/// The watchdog's time after its last feed, s (docs/board-nucleo-f446re.md).
+const WATCHDOG_S: [f64; 2] = [6.8e-3, 18.8e-3];
+
+/// Switches the board on and waits until the control ticks run.
+fn started(image: &Path, settings: Option<&[u8]>) -> Result<Bench> {
+    let mut bench = Bench::start(image, settings);
+    ensure!(
+        runs(&mut bench),
+        "no control tick within {START_S} s; log: {:#?}",
+        bench.log()
+    );
+    Ok(bench)
+}
+
+/// Waits until control ticks run.
+fn runs(bench: &mut Bench) -> bool {
+    bench.run_while(START_S, 0.005, |bench| {
+        bench.with(|world, _, _| world.ticks.count > 20)
+    })
+}
+
+/// Contents of the settings' sectors after the simulated stage's settings were stored by the link.
+fn commissioned(image: &Path) -> Result<Vec<u8>> {
+    static STORED: OnceLock<Vec<u8>> = OnceLock::new();
+    if let Some(stored) = STORED.get() {
+        return Ok(stored.clone());
+    }
+    let mut bench = started(image, None)?;
+    let mut client = Client::open(&mut bench)?;
+    client.load(
+        &mut bench,
+        &StageSettings::simulated(),
+        &StageSettings::default(),
+    )?;
+    client.store(&mut bench, "board-run")?;
+    Ok(STORED.get_or_init(|| bench.settings_flash()).clone())
+}
+
+/// A commissioned board whose outputs drive the three axes.
+fn driving(image: &Path) -> Result<(Bench, Client)> {
+    let mut bench = started(image, Some(&commissioned(image)?))?;
+    bench.with(|world, _, _| world.plant = true);
+    let mut client = Client::open(&mut bench)?;
+    enable(&mut bench, &mut client)?;
+    Ok((bench, client))
+}
+
+/// Enables, and waits until the outputs drive.
+fn enable(bench: &mut Bench, client: &mut Client) -> Result<()> {
+    client.ask(bench, Body::Enable)?;
+    bench.run_for(0.005);
+    let state = client.status(bench)?.state;
+    ensure!(
+        state == MachineState::Enabled,
+        "enabled, but the state is {}",
+        state.as_str()
+    );
+    Ok(())
+}
+
+/// Time from an instant to the last fall of the enable line, s; none if it has not fallen since.
+fn disabled_after(bench: &mut Bench, since: u64) -> Option<f64> {
+    let enables = bench.with(|world, _, _| world.enables.clone());
+    let fall = enables
+        .iter()
+        .find(|change| change.0 >= since && !change.1)?;
+    Some((fall.0 - since) as f64 * 1e-9)
+}
+
+/// Adds a row of the time in which the outputs were off.
+fn row_off(bench: &mut Bench, report: &mut Report, done: &str, since: u64, most_s: f64) {
+    let off = disabled_after(bench, since);
+    let measured = off.map_or("still on".into(), |s| format!("{:.1} us", s * 1e6));
+    report.row(
+        done,
+        format!("off within {:.0} us", most_s * 1e6),
+        measured,
+        off.is_some_and(|s| s <= most_s),
+    );
+}
+
+/// Adds a row of the latched fault.
+fn row_fault(
+    bench: &mut Bench,
+    client: &mut Client,
+    report: &mut Report,
+    done: &str,
+    expected: &str,
+) -> Result<()> {
+    let fault = match client.ask(bench, Body::Fault)? {
+        Reply::Fault(fault) => fault,
+        other => return Err(anyhow!("the fault was asked for, the answer is {other:?}")),
+    };
+    let name = fault.map_or("none".into(), |fault| {
+        let axis = fault.axis.map_or(String::new(), |axis| format!(" {axis}"));
+        format!("{} {}{axis}", fault.code, fault.name)
+    });
+    report.equal(done, expected.to_owned(), name);
+    Ok(())
+}
