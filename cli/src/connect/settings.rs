@@ -20,25 +20,39 @@ use crate::kept;
 pub(super) fn get(client: &mut Client, path: &str) -> anyhow::Result<Answer> {
     let path = whole_path(path);
     match settings::get(client, &path) {
+        // A part that may be left out: with what is in it.
+        Ok(value) if value == "present" => {
+            let text = lines(&leaves(client, &path)?);
+            Ok(Answer::new(text, value))
+        }
         Ok(value) => Ok(Answer::new(&value, value.clone())),
         Err(error) => {
             // Perhaps a path above leaves.
-            let paths = below(client, &path)?;
-            if paths.is_empty() {
+            let values = leaves(client, &path)?;
+            if values.is_empty() {
                 return Err(named(error, "get", &path));
             }
-            let mut values = Map::new();
-            for path in paths {
-                let value = settings::get(client, &path)?;
-                values.insert(short(&path), value);
-            }
-            let lines: Vec<String> = values
-                .iter()
-                .map(|(path, value)| format!("{path} {value}"))
-                .collect();
-            Ok(Answer::new(lines.join("\n"), Value::Object(values)))
+            Ok(Answer::new(lines(&values), Value::Object(values)))
         }
     }
+}
+
+/// The settings at a path and below, with their values.
+fn leaves(client: &mut Client, path: &str) -> anyhow::Result<Map<String, Value>> {
+    let mut values = Map::new();
+    for path in below(client, path)? {
+        let value = settings::get(client, &path)?;
+        values.insert(short(&path), value);
+    }
+    Ok(values)
+}
+
+fn lines(values: &Map<String, Value>) -> String {
+    let lines: Vec<String> = values
+        .iter()
+        .map(|(path, value)| format!("{path} {value}"))
+        .collect();
+    lines.join("\n")
 }
 
 fn below(client: &mut Client, path: &str) -> anyhow::Result<Vec<String>> {

@@ -34,7 +34,7 @@ fn hold(session: &mut Session, what: &str, pressed: Switches) -> anyhow::Result<
         .map(|(name, _)| name)
         .collect();
     let text = if held.is_empty() {
-        "nothing is pressed".to_owned()
+        "all inputs are released".to_owned()
     } else {
         format!("pressed: {}", held.join(", "))
     };

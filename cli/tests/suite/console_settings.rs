@@ -292,3 +292,11 @@ fn no_zero_has_a_sign() {
         );
     }
 }
+
+#[test]
+fn a_part_that_may_be_left_out_is_shown_with_what_is_in_it() {
+    let output = session(&[], "get x/homing\n");
+    let shown = String::from_utf8(output.stdout).unwrap();
+    assert!(shown.contains("x/homing \"present\""), "{shown}");
+    assert!(shown.contains("x/homing/latch_mm_s 2"), "{shown}");
+}
