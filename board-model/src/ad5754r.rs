@@ -1,6 +1,6 @@
 //! Model of Analog Devices' quad 16-bit converter AD5754R, behind its five wires.
 //!
-//! Written from what is known of its data sheet (table of timing characteristics, input shift register format, register map), without
+//! Written from memory of its data sheet (table of timing characteristics, input shift register format, register map), without
 //! reading this project's driver. Every violation of a time or a format is a complaint, and a frame that violates the format
 //! does nothing. `SCLK`'s edges are not seen, only bytes: that its period is long enough is for the scenario to check.
 //!
