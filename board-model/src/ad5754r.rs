@@ -1,6 +1,6 @@
 //! Model of Analog Devices' quad 16-bit converter AD5754R, behind its five wires.
 //!
-//! Written from what is known of its data sheet (table of timing characteristics, input shift register format, register map), without
+//! Written from memory of its data sheet (table of timing characteristics, input shift register format, register map), without
 //! reading this project's driver. Every violation of a time or a format is a complaint, and a frame that violates the format
 //! does nothing. `SCLK`'s edges are not seen, only bytes: that its period is long enough is for the scenario to check.
 //!
@@ -66,13 +66,7 @@ pub struct Ad5754r {
     /// Frames of 24 bits that were carried out.
     pub frames: u64,
     /// Beginning of the last write frame to channel A, ns.
-    pub began: u64,
-    /// Loads by `/LDAC`: time in ns, the codes of x, y and z. Kept only if `recording`.
-    pub loads: Vec<(u64, [i16; 3])>,
-    /// True if `loads` is kept.
-    pub recording: bool,
-    /// Time of the last load, ns.
-    pub loaded_at: u64,
+    began: u64,
     /// The longest time from the beginning of the write frame to channel A to `/LDAC`, ns.
     pub longest_load: u64,
     /// The chip loses its supply after so many bytes.
@@ -103,9 +97,6 @@ impl Default for Ad5754r {
             complaints: Vec::new(),
             frames: 0,
             began: 0,
-            loads: Vec::new(),
-            recording: false,
-            loaded_at: 0,
             longest_load: 0,
             fails_after_bytes: None,
         }
@@ -171,8 +162,6 @@ impl Ad5754r {
             ldac: self.ldac,
             clr: self.clr,
             complaints: std::mem::take(&mut self.complaints),
-            loads: std::mem::take(&mut self.loads),
-            recording: self.recording,
             frames: self.frames,
             ..Self::default()
         };
@@ -333,11 +322,7 @@ impl Ad5754r {
             self.check(now, self.powered_up_at, POWER_UP_NS, "load after power-up");
         }
         self.dac = self.input;
-        self.loaded_at = now;
         self.longest_load = self.longest_load.max(now - self.began);
-        if self.recording {
-            self.loads.push((now, self.codes()));
-        }
     }
 
     fn clear(&mut self) {

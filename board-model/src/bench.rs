@@ -18,7 +18,7 @@ use rigless::symbols::Symbols;
 use rigless::time::VirtualNanos;
 
 use crate::ad5754r::{self, Shared};
-use crate::board::{At, BRAKE, COUNTER, ENABLE, HSE_HZ, Nucleo, SharedLine, TIMERS};
+use crate::board::{At, COUNTER, ENABLE, HSE_HZ, Nucleo, SharedLine, TIMERS};
 use crate::log::Log;
 use crate::stage::{Axis, INDEX_COUNTS, STEP_NS};
 
@@ -129,8 +129,6 @@ pub struct World {
     pub ticks: Ticks,
     /// Changes of the enable line: time in ns, level.
     pub enables: Vec<(u64, bool)>,
-    /// Changes of the brake's line: time in ns, level.
-    pub brakes: Vec<(u64, bool)>,
     /// Feeds of the watchdog: the last one and the longest time between two, ns.
     pub feeds: (u64, u64),
     /// Restarts: time in ns, cause.
@@ -214,12 +212,10 @@ impl World {
         self.edges.make_contiguous().sort_by_key(|edge| edge.0);
     }
 
-    fn note_lines(&mut self, board: &mut Nucleo, now: u64) {
-        for (at, changes) in [(ENABLE, &mut self.enables), (BRAKE, &mut self.brakes)] {
-            let level = board.level(at);
-            if changes.last().is_none_or(|last| last.1 != level) {
-                changes.push((now, level));
-            }
+    fn note_enable(&mut self, board: &mut Nucleo, now: u64) {
+        let level = board.level(ENABLE);
+        if self.enables.last().is_none_or(|last| last.1 != level) {
+            self.enables.push((now, level));
         }
     }
 
@@ -290,7 +286,7 @@ impl Driver<Nucleo> for World {
             }
             address if PORTS.contains(&address) => {
                 let board = session.board_mut();
-                self.note_lines(board, now.0);
+                self.note_enable(board, now.0);
                 // MODER, AFRL, AFRH: the lines of the encoders reach their timers, or no longer.
                 if matches!(address & 0x3FF, 0 | 0x20 | 0x24) {
                     for axis in 0..3 {
@@ -311,7 +307,7 @@ impl Driver<Nucleo> for World {
         let now = stop.at.0;
         self.note_resets(session, stop.at);
         let board = session.board_mut();
-        self.note_lines(board, now);
+        self.note_enable(board, now);
         if now >= self.next_step {
             self.next_step = now + STEP_NS;
             self.plan_edges(board, now);
@@ -609,7 +605,6 @@ fn run(
         log: Log::new(&elf, symbols.get("_SEGGER_RTT").ok())?,
         ticks: Ticks::default(),
         enables: Vec::new(),
-        brakes: Vec::new(),
         feeds: (0, 0),
         resets: Vec::new(),
         chip: chip.clone(),

@@ -31,7 +31,7 @@ pub struct At(pub usize, pub u8);
 /// Amplifier enable, high enables.
 pub const ENABLE: At = At(2, 9);
 /// Holding brake, high releases.
-pub const BRAKE: At = At(1, 5);
+const BRAKE: At = At(1, 5);
 /// Second contact of the emergency stop.
 pub const EMERGENCY_STOP: At = At(0, 0);
 /// Amplifiers ready.

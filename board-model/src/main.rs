@@ -9,7 +9,7 @@ mod report;
 mod scenarios;
 mod stage;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -23,10 +23,10 @@ use crate::scenarios::{SCENARIOS, Scenario};
 #[derive(Parser)]
 #[command(name = "cargo xtask board-run", bin_name = "cargo xtask board-run")]
 struct Options {
-    /// The image
-    #[arg(long)]
-    image: PathBuf,
-    /// Names the scenarios and stops
+    /// The image [default: built from the tree]
+    #[arg(long, required_unless_present = "list")]
+    image: Option<PathBuf>,
+    /// Names the scenarios
     #[arg(long)]
     list: bool,
     /// Runs the scenarios of this name only; may be repeated
@@ -57,11 +57,12 @@ fn main() -> ExitCode {
     let chosen = SCENARIOS
         .iter()
         .filter(|s| options.only.is_empty() || options.only.iter().any(|n| n == s.name));
+    let image = options.image.unwrap_or_default();
     log::SHOWN.store(options.log, Ordering::Relaxed);
     let started = Instant::now();
     let (mut rows, mut failed) = (0, 0);
     for scenario in chosen {
-        let report = run(scenario, &options);
+        let report = run(scenario, &image);
         rows += report.rows.len();
         failed += report.rows.iter().filter(|row| !row.3).count();
     }
@@ -77,10 +78,10 @@ fn main() -> ExitCode {
 }
 
 /// Runs a scenario and prints its rows.
-fn run(scenario: &Scenario, options: &Options) -> Report {
+fn run(scenario: &Scenario, image: &Path) -> Report {
     let started = Instant::now();
     let mut report = Report::default();
-    if let Err(error) = (scenario.run)(&options.image, &mut report) {
+    if let Err(error) = (scenario.run)(image, &mut report) {
         report.row(
             "the scenario itself",
             "runs to its end",

@@ -47,7 +47,7 @@ fn build() -> Result<PathBuf> {
     let program = root.join(FOLDER).join("build/release/quadrant-board-model");
     patched_model(&root)?;
     if !program.exists() {
-        println!("building the chip model: 7 to 10 min on two cores, the first time only");
+        println!("building the chip model: 4 to 10 min on two cores, the first time only");
     }
     let mut cargo = command::command("cargo");
     cargo

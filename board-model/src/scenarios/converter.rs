@@ -2,17 +2,40 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use quadrant_link::message::{AxisName, Body};
 
 use crate::ad5754r;
+use crate::bench::Bench;
+use crate::board::ENABLE;
+use crate::link::Client;
 use crate::report::Report;
-use crate::scenarios::{driving, row_fault, row_off};
+use crate::scenarios::{commissioned, driving, row_fault, row_off, runs};
 
 /// From the loss to the disabled amplifiers, s: a difference is found within four ticks (docs/board-nucleo-f446re.md), and a tick's computation.
 const FOUND_S: f64 = 500e-6;
 
 pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
+    let mut bench = Bench::start(image, Some(&commissioned(image)?));
+    ad5754r::lock(&bench.chip).power_off();
+    ensure!(runs(&mut bench), "no control tick without a converter");
+    let mut client = Client::open(&mut bench)?;
+    let refusal = client
+        .ask(&mut bench, Body::Enable)
+        .err()
+        .map(|error| format!("{error:#}"));
+    bench.run_for(0.01);
+    let drives = bench.with(|_, board, _| board.level(ENABLE));
+    let answer = refusal.unwrap_or_else(|| "accepted".into());
+    report.row(
+        "no converter at the start: `enable`",
+        "refused",
+        answer,
+        !drives,
+    );
+    report.equal("no converter at the start: /CLR", "low", clear(&bench));
+    drop(bench);
+
     let (mut bench, mut client) = driving(image)?;
     client.ask(
         &mut bench,
@@ -33,8 +56,7 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
         since,
         FOUND_S,
     );
-    let released = ad5754r::lock(&bench.chip).is_clear_released();
-    report.equal("/CLR", "low", if released { "high" } else { "low" });
+    report.equal("/CLR", "low", clear(&bench));
     row_fault(
         &mut bench,
         &mut client,
@@ -56,7 +78,15 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
     report.equal(
         "`enable` with a converter that was not set up",
         false,
-        bench.with(|_, board, _| board.level(crate::board::ENABLE)),
+        bench.with(|_, board, _| board.level(ENABLE)),
     );
     Ok(())
+}
+
+/// The level of /CLR.
+fn clear(bench: &Bench) -> &'static str {
+    match ad5754r::lock(&bench.chip).is_clear_released() {
+        true => "high",
+        false => "low",
+    }
 }

@@ -21,6 +21,8 @@ const TASK: &str = "DISPATCHER_1";
 const TASK_PERIOD_S: f64 = 1e-3;
 /// `push {r4-r7, lr}` and a branch to it.
 const RECURSION: [u32; 1] = [0xE7FD_B5F0];
+/// Addresses without memory below the stack, which is at the bottom of RAM.
+const BELOW_STACK: std::ops::Range<u64> = 0x1FFF_8000..0x2000_0000;
 /// Writes NMIPENDSET, bit 31 of ICSR (0xE000ED04), and loops: movw, movt, mov.w, str, b.
 const PEND_NMI: [u32; 4] = [0x5004_F64E, 0x0000_F2CE, 0x4100_F04F, 0xE7FE_6001];
 
@@ -148,7 +150,17 @@ fn run_instead(bench: &mut Bench, image: &Path, code: &'static [u32]) -> Result<
 
 pub(super) fn stack_overflow(image: &Path, report: &mut Report) -> Result<()> {
     let (mut bench, _) = jogging(image)?;
+    // The model answers where there is no memory; the chip's first store there is a bus error.
+    bench.with_session(|_, session, _, _| session.fail_next(BELOW_STACK.start, BELOW_STACK.end));
     let since = run_instead(&mut bench, image, &RECURSION)?;
+    let log = bench.log();
+    let says = log.iter().find(|line| line.contains("the stack is full"));
+    report.row(
+        "cause in the log",
+        "the stack is full",
+        says.map_or("none", String::as_str),
+        says.is_some(),
+    );
     aftermath(
         &mut bench,
         report,
