@@ -396,7 +396,14 @@ fn run() -> Result<()> {
         minutes: 0,
     };
     session::write(&session, &folder, "axis")?;
-    xtask::command::run(xtask::command::command("linuxcnc").arg(folder.join("machine.ini")))
+    let ini = folder.join("machine.ini");
+    ensure!(
+        !session::is_root()?,
+        "LinuxCNC does not run as root: as another user, who may write to {}: linuxcnc {}",
+        folder.display(),
+        ini.display()
+    );
+    xtask::command::run(xtask::command::command("linuxcnc").arg(ini))
 }
 
 fn main() -> Result<()> {

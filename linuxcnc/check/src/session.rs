@@ -38,11 +38,16 @@ pub(crate) struct Session {
     pub(crate) minutes: u32,
 }
 
+/// True for the user that LinuxCNC refuses.
+pub(crate) fn is_root() -> Result<bool> {
+    let user = command::output(command::command("id").arg("-u"))?;
+    Ok(user.trim() == "0")
+}
+
 /// Makes the user, unless there is one.
 pub(crate) fn make_user() -> Result<()> {
-    let user = command::output(command::command("id").arg("-u"))?;
     ensure!(
-        user.trim() == "0",
+        is_root()?,
         "the check makes a user and spaces for each session: run it as root"
     );
     if Path::new("/home").join(USER).exists() {
