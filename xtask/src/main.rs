@@ -9,6 +9,7 @@ mod frames;
 mod layout;
 mod lines;
 mod modules;
+mod msrv;
 mod peers;
 mod python;
 mod setup;
@@ -59,6 +60,8 @@ enum Verb {
         #[arg(long)]
         overwrite_expected: bool,
     },
+    /// Check that the oldest compiler that each package states is one that its dependencies allow, and compile with it if rustup has it
+    Msrv,
     /// Prove from the linked image that the control tick cannot panic
     ProveNoPanic(TargetArgs),
     /// Play a session through the console, on the simulated machine and on the emulated image
@@ -202,6 +205,7 @@ fn run(cli: Cli) -> Result<bool> {
             layout::check(&image, args.overwrite_expected)?;
         }
         Verb::Lines { overwrite_expected } => lines::run(overwrite_expected)?,
+        Verb::Msrv => msrv::run()?,
         Verb::ProveNoPanic(args) => prove::run(toolchain()?, args.into())?,
         Verb::Transcript { overwrite_expected } => {
             transcript::run(toolchain()?, overwrite_expected)?

@@ -1,11 +1,10 @@
 //! Hints for the compiler that not every supported one takes.
 
-// Of 1.95; the build script asks for the version.
-#[cfg(has_cold_path)]
-#[allow(clippy::incompatible_msrv)]
-pub(crate) use core::hint::cold_path;
-
-/// A branch that is seldom taken; older compilers take no such hint, and the results are the same.
-#[cfg(not(has_cold_path))]
+/// Marks the branch that it is in as seldom taken. Compilers before 1.95 take no such hint: the results are the same.
 #[inline(always)]
-pub(crate) const fn cold_path() {}
+// The build script asks for the version.
+#[allow(clippy::incompatible_msrv)]
+pub(crate) const fn cold_path() {
+    #[cfg(has_cold_path)]
+    core::hint::cold_path();
+}
