@@ -104,7 +104,6 @@ impl Release {
         cargo
             .args(["build", "--release", "--package", "quadrant-cli"])
             .args(["--target", triple, "--target-dir", "target/release-command"])
-            .env("CARGO_PROFILE_RELEASE_STRIP", "true")
             .env("RUSTFLAGS", self.flags());
         command::run(&mut cargo)?;
         let program = self.root.join("target/release-command");
@@ -114,7 +113,12 @@ impl Release {
         let packed = format!("quadrant-{}-{triple}", self.version);
         let folder = self.out.join(&packed);
         fs::create_dir_all(&folder)?;
-        fs::copy(&program, folder.join("quadrant"))?;
+        command::run_quietly(
+            command::command("strip")
+                .arg("-o")
+                .arg(folder.join("quadrant"))
+                .arg(&program),
+        )?;
         for name in LICENCES {
             fs::copy(self.root.join(name), folder.join(name))?;
         }
