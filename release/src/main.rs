@@ -8,20 +8,20 @@ mod state;
 mod table;
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::{Parser, ValueEnum};
 use xtask::command;
 
 use crate::parts::{Part, Release};
-use crate::table::Table;
+use crate::table::{SUMS, Table};
 
 /// The files of a release
 #[derive(Parser)]
-#[command(name = "cargo xtask release")]
+#[command(name = "cargo xtask release", bin_name = "cargo xtask release")]
 struct Options {
     /// Release nothing: any commit will do, with changes too, and the notes are those of the changelog's section Unreleased
     #[arg(long)]
@@ -34,6 +34,23 @@ struct Options {
     only: Vec<Part>,
 }
 
+/// Makes a folder, or empties one that an earlier release was made in.
+fn empty(folder: &Path) -> Result<()> {
+    let is_in_use = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
+    if is_in_use {
+        ensure!(
+            folder.join(SUMS).is_file(),
+            "{} has files, and no {SUMS}: choose another folder",
+            folder.display()
+        );
+        fs::remove_dir_all(folder)
+            .with_context(|| format!("cannot remove {}", folder.display()))?;
+    }
+    fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
+    // Also where this run is interrupted.
+    fs::write(folder.join(SUMS), "").with_context(|| format!("cannot write {SUMS}"))
+}
+
 /// Makes the files and returns whether all of them could be made.
 fn run(options: &Options) -> Result<bool> {
     let root = command::root();
@@ -41,10 +58,7 @@ fn run(options: &Options) -> Result<bool> {
     let notes = state.check(options.dry_run)?;
     println!("{state}");
     let out = root.join(&options.out);
-    if out.exists() {
-        fs::remove_dir_all(&out).with_context(|| format!("cannot remove {}", out.display()))?;
-    }
-    fs::create_dir_all(&out).with_context(|| format!("cannot create {}", out.display()))?;
+    empty(&out)?;
     let release = Release {
         version: state.version,
         notes,
@@ -78,5 +92,24 @@ fn main() -> ExitCode {
             eprintln!("error: {error:#}");
             ExitCode::FAILURE
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_with_files_of_others_is_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mine, others) = (folder.path().join("mine"), folder.path().join("others"));
+        empty(&mine).unwrap();
+        fs::write(mine.join("old.whl"), "").unwrap();
+        empty(&mine).unwrap();
+        assert!(!mine.join("old.whl").exists());
+        fs::create_dir(&others).unwrap();
+        fs::write(others.join("thesis.pdf"), "").unwrap();
+        assert!(empty(&others).is_err());
+        assert!(others.join("thesis.pdf").exists());
     }
 }

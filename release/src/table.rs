@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 use crate::parts::Part;
 
 /// File of the checksums, as `sha256sum --check` reads it.
-const SUMS: &str = "SHA256SUMS";
+pub(crate) const SUMS: &str = "SHA256SUMS";
 
 /// A file that was made.
 struct Made {
