@@ -11,6 +11,7 @@ mod endpoint;
 mod grammar;
 mod identify;
 mod kept;
+mod manual;
 mod new;
 mod numbers;
 mod own_stage;
@@ -22,10 +23,21 @@ mod settings;
 mod subject;
 
 use std::process::ExitCode;
+use std::sync::LazyLock;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use quadrant_cli::{explained, terminal, warn};
+
+/// Version, commit, and the version of the link's protocol that a board has to speak.
+static LONG_VERSION: LazyLock<String> = LazyLock::new(|| {
+    format!(
+        "{}\ncommit {}\nlink protocol {}",
+        env!("CARGO_PKG_VERSION"),
+        env!("QUADRANT_COMMIT"),
+        quadrant_link::PROTOCOL_VERSION
+    )
+});
 
 /// Servo control that removes friction's quadrant glitches: identify, design, commission, test and talk to a machine.
 ///
@@ -34,6 +46,7 @@ use quadrant_cli::{explained, terminal, warn};
 #[command(
     name = "quadrant",
     version,
+    long_version = LONG_VERSION.as_str(),
     about,
     args_conflicts_with_subcommands = true
 )]
@@ -63,6 +76,8 @@ enum Command {
     /// Identify an axis: its linear model, its friction, from experiments or from recordings.
     #[command(subcommand)]
     Identify(identify::Command),
+    /// Write a manual page of each command to a folder.
+    Man(manual::Arguments),
     /// Write a settings file for a machine that nobody has commissioned: encoder, amplifier, limits, rate. Asks on a terminal for what is not
     /// given.
     New(new::Arguments),
@@ -100,6 +115,7 @@ fn run() -> anyhow::Result<()> {
         Some(Command::Connect(arguments)) => connect::run(&arguments),
         Some(Command::Design(command)) => design::run(&command),
         Some(Command::Identify(command)) => identify::run(&command),
+        Some(Command::Man(arguments)) => manual::run(&arguments, Arguments::command()),
         Some(Command::New(arguments)) => new::run(&arguments),
         Some(Command::Plot(arguments)) => plot::run(&arguments),
         Some(Command::Replay(arguments)) => replay::run(&arguments),

@@ -9,6 +9,7 @@ mod frames;
 mod layout;
 mod lines;
 mod modules;
+mod msrv;
 mod peers;
 mod python;
 mod setup;
@@ -18,10 +19,11 @@ mod transcript;
 mod web;
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum as _};
 
 use xtask::image::{self, Board, Scalar, Target};
 use xtask::toolchain::{Choice, Toolchain};
@@ -58,6 +60,8 @@ enum Verb {
         #[arg(long)]
         overwrite_expected: bool,
     },
+    /// Check that the oldest compiler that each package states is one that its dependencies allow, and compile with it if rustup has it
+    Msrv,
     /// Prove from the linked image that the control tick cannot panic
     ProveNoPanic(TargetArgs),
     /// Play a session through the console, on the simulated machine and on the emulated image
@@ -89,7 +93,13 @@ enum Verb {
     /// Time the host simulation beside the same job in C++, Numba and NumPy
     Peers,
     /// Build the Python package, and run its tests, types, examples and notebooks in a clean environment
-    Python,
+    Python {
+        /// Only build the wheel, into this folder
+        #[arg(long, value_name = "FOLDER")]
+        wheel: Option<PathBuf>,
+    },
+    /// Check that the commit can be released, and make the files of a release with their checksums
+    Release(Forwarded),
     /// Build the page of the bench, which a browser opens
     Web(WebArgs),
     /// Run the commands that README and docs show, in folders below target/documented
@@ -108,7 +118,7 @@ enum Verb {
     },
 }
 
-/// Options of the packages `target-tests` and `linuxcnc/check`.
+/// Options of the packages `target-tests`, `linuxcnc/check` and `release`.
 #[derive(Args)]
 #[command(disable_help_flag = true)]
 struct Forwarded {
@@ -195,6 +205,7 @@ fn run(cli: Cli) -> Result<bool> {
             layout::check(&image, args.overwrite_expected)?;
         }
         Verb::Lines { overwrite_expected } => lines::run(overwrite_expected)?,
+        Verb::Msrv => msrv::run()?,
         Verb::ProveNoPanic(args) => prove::run(toolchain()?, args.into())?,
         Verb::Transcript { overwrite_expected } => {
             transcript::run(toolchain()?, overwrite_expected)?
@@ -210,7 +221,11 @@ fn run(cli: Cli) -> Result<bool> {
         Verb::Saturation(args) => forward(toolchain()?, "saturation", args)?,
         Verb::Linuxcnc(args) => linuxcnc(args)?,
         Verb::Peers => peers::run()?,
-        Verb::Python => python::run()?,
+        Verb::Python { wheel: None } => python::run()?,
+        Verb::Python {
+            wheel: Some(folder),
+        } => python::build_wheel(&folder)?,
+        Verb::Release(args) => release(cli.toolchain, args)?,
         Verb::Documented(options) => documented::run(&options)?,
         Verb::Figures { overwrite } => figures::run(overwrite)?,
         Verb::Web(args) => {
@@ -246,6 +261,18 @@ fn linuxcnc(args: Forwarded) -> Result<()> {
         ])
         .args(args.options);
     command::run_quietly(&mut cargo)
+}
+
+/// Runs the package `quadrant-release`.
+fn release(toolchain: Option<Choice>, args: Forwarded) -> Result<()> {
+    let mut cargo = command::command("cargo");
+    cargo.args(["run", "--quiet", "--profile", "chores"]);
+    cargo.args(["--package", "quadrant-release", "--"]);
+    // Its chores read it.
+    if let Some(choice) = toolchain.and_then(|choice| choice.to_possible_value()) {
+        cargo.env("QUADRANT_TOOLCHAIN", choice.get_name());
+    }
+    command::run_quietly(cargo.args(args.options))
 }
 
 /// Runs a verb of the package `target-tests`.

@@ -21,14 +21,16 @@ const PACKAGES: [&str; 9] = [
     "nbconvert",
     "ipykernel",
     "dask[distributed]",
-    "maturin>=1.9,<2",
+    MATURIN,
 ];
+/// What builds the wheel.
+const MATURIN: &str = "maturin>=1.9,<2";
 
 /// Builds the wheel, installs it, and runs tests, types, examples and notebooks.
 pub(crate) fn run() -> Result<()> {
     let root = command::root();
     let (sources, folder) = (root.join(SOURCES), root.join(FOLDER));
-    let python = environment(&folder)?;
+    let python = environment(&folder, &PACKAGES)?;
     let wheel = wheel(&sources, &folder, &python)?;
     pip(&python, &[&format!("{}[all]", wheel.display())])?;
     let left = folder.join("left");
@@ -71,15 +73,27 @@ pub(crate) fn run() -> Result<()> {
     Ok(())
 }
 
-/// Makes a clean environment with the packages of the tests; returns its Python.
-fn environment(folder: &Path) -> Result<PathBuf> {
+/// Builds the wheel into a folder, in an environment that has no more than what builds it.
+pub(crate) fn build_wheel(folder: &Path) -> Result<()> {
+    let root = command::root();
+    let python = environment(&root.join(FOLDER), &[MATURIN])?;
+    let wheel = wheel(&root.join(SOURCES), &root.join(FOLDER), &python)?;
+    let name = wheel.file_name().context("a wheel has a name")?;
+    let path = root.join(folder).join(name);
+    fs::copy(&wheel, &path).with_context(|| format!("cannot write {}", path.display()))?;
+    println!("{}", path.display());
+    Ok(())
+}
+
+/// Makes a clean environment with packages; returns its Python.
+fn environment(folder: &Path, packages: &[&str]) -> Result<PathBuf> {
     let place = folder.join("environment");
     if place.exists() {
         fs::remove_dir_all(&place).with_context(|| format!("cannot remove {}", place.display()))?;
     }
     command::run(command::command("python3").args(["-m", "venv"]).arg(&place))?;
     let python = place.join("bin/python");
-    pip(&python, &PACKAGES)?;
+    pip(&python, packages)?;
     Ok(python)
 }
 

@@ -13,7 +13,7 @@ use xtask::image::{self, LAW_TRIPLES, LIBRARY_TRIPLES, TRIPLES, Target};
 use xtask::toolchain::{self, Choice, Toolchain};
 use xtask::{command, prove};
 
-use crate::{documented, figures, layout, lines, python, setup, transcript, web};
+use crate::{documented, figures, layout, lines, msrv, python, setup, transcript, web};
 
 /// Settings that a commissioning left, and seconds that the firmware runs on them.
 const COMMISSIONED: &str = "host-sim/data/identified-stage.toml";
@@ -151,6 +151,7 @@ fn host(report: &mut Report) -> Result<()> {
         command::run(cargo().args(["fmt", "--all", "--check"]))
     });
     report.step("lines by package", || lines::run(false));
+    report.step("oldest compilers", msrv::run);
     report.step("host tests", || {
         // Setup has installed the browser: the tests that open pages in it must not skip.
         command::run(

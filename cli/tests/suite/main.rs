@@ -2,6 +2,7 @@
 //!
 //! One program of many modules: each would otherwise be linked once more.
 
+mod about;
 mod circle;
 mod command;
 mod commission;

@@ -88,7 +88,8 @@ impl<T> PerAxis<T> {
 
     /// References to the values.
     pub const fn by_ref(&self) -> PerAxis<&T> {
-        PerAxis(self.0.each_ref())
+        let [x, y, z] = &self.0;
+        PerAxis([x, y, z])
     }
 
     /// Each value with that of another set for the same axis.

@@ -1,6 +1,6 @@
 //! From a hardware counter that wraps to a count that does not.
 
-use core::hint::cold_path;
+use crate::hint::cold_path;
 
 use crate::units::{EncoderCount, POSITION_FRACTION_BITS, Position};
 

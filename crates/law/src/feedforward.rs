@@ -20,7 +20,7 @@
 //! motion. The rest of the elements' memory is right again once the
 //! reference has moved over the pre-sliding range in one sense.
 
-use core::hint::cold_path;
+use crate::hint::cold_path;
 
 use crate::friction::dahl::Dahl;
 use crate::friction::gms::{Gms, GmsState};

@@ -110,6 +110,7 @@ pub mod decimal;
 pub mod encoder;
 pub mod feedforward;
 pub mod friction;
+mod hint;
 pub mod homing;
 pub mod injection;
 pub mod learning;

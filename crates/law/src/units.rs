@@ -3,7 +3,7 @@
 //! A position is never held as a float. [`Position`] is an `i64` of encoder counts with 16 fraction bits, so that a
 //! reference does not drift however long it runs, and the tracking error is formed before anything is rounded.
 
-use core::hint::cold_path;
+use crate::hint::cold_path;
 use core::ops::{Add, Neg, Sub};
 
 use crate::rounding;

@@ -113,26 +113,52 @@ pub(crate) fn build(folder: &Path) -> Result<()> {
 
 /// Builds both modules and puts them among LinuxCNC's, with the manual page.
 pub(crate) fn install() -> Result<()> {
-    let folder = tempfile::tempdir()?;
-    build(folder.path())?;
-    prove::prove(&folder.path().join("quadrant.so"))?;
-    for component in COMPONENTS {
-        let module = format!("{component}.so");
-        let place = Path::new(MODULES).join(&module);
-        // A module that is loaded keeps its old content.
-        let _ = fs::remove_file(&place);
-        command::run_quietly(
-            command::command("strip")
-                .arg("-o")
-                .arg(&place)
-                .arg(folder.path().join(&module)),
-        )
-        .with_context(|| format!("{}: run it as root", place.display()))?;
-        println!("{}", place.display());
+    for module in build_proven(Path::new(MODULES))? {
+        println!("{}", module.display());
     }
     fs::create_dir_all(MANUALS)?;
     fs::copy(sources().join(MANUAL), Path::new(MANUALS).join(MANUAL))?;
     Ok(())
+}
+
+/// Builds both modules into a folder, with manual page and configurations.
+pub(crate) fn pack(folder: &Path) -> Result<()> {
+    build_proven(folder)?;
+    fs::copy(sources().join(MANUAL), folder.join(MANUAL))?;
+    command::run_quietly(
+        command::command("cp")
+            .arg("--recursive")
+            .arg(sources().join("configs"))
+            .arg(folder),
+    )
+}
+
+/// Builds both modules, proves of one that its tick does not panic, and puts them into a folder; returns their paths.
+fn build_proven(place: &Path) -> Result<Vec<PathBuf>> {
+    let folder = tempfile::tempdir()?;
+    build(folder.path())?;
+    prove::prove(&folder.path().join("quadrant.so"))?;
+    let mut modules = Vec::new();
+    for component in COMPONENTS {
+        let module = format!("{component}.so");
+        let path = place.join(&module);
+        // A module that is loaded keeps its old content.
+        let _ = fs::remove_file(&path);
+        command::run_quietly(
+            command::command("strip")
+                .arg("-o")
+                .arg(&path)
+                .arg(folder.path().join(&module)),
+        )
+        .with_context(|| {
+            format!(
+                "cannot write {}: LinuxCNC's folder needs root",
+                path.display()
+            )
+        })?;
+        modules.push(path);
+    }
+    Ok(modules)
 }
 
 /// Takes away what [`install`] has put there.

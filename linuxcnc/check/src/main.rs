@@ -39,6 +39,9 @@ struct Options {
     /// Build both components against the installed LinuxCNC, and install them
     #[arg(long)]
     install: bool,
+    /// Build both components against the installed LinuxCNC into this folder, with manual page and configurations
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["install", "uninstall", "run", "check"])]
+    build: Option<std::path::PathBuf>,
     /// Remove them
     #[arg(long, conflicts_with_all = ["install", "run", "check"])]
     uninstall: bool,
@@ -412,6 +415,9 @@ fn main() -> Result<()> {
         return install::uninstall();
     }
     install::require_linuxcnc(options.check)?;
+    if let Some(folder) = &options.build {
+        return install::pack(folder);
+    }
     if options.install || options.check && !options.again {
         install::install()?;
     }

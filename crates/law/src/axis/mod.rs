@@ -27,7 +27,7 @@ mod rest;
 mod state;
 pub mod telemetry;
 
-use core::hint::cold_path;
+use crate::hint::cold_path;
 
 pub use self::build::{AxisBuilder, AxisError};
 use self::output::Amplifier;

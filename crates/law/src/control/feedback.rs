@@ -1,6 +1,6 @@
 //! The feedback law of an axis: which one it is, and what they all share.
 
-use core::hint::cold_path;
+use crate::hint::cold_path;
 
 use super::cascade::Cascade;
 use super::nctf::Nctf;

@@ -1,7 +1,7 @@
 //! The end of every law: the integral is added, the output is cut to its bounds, and while it is cut the integral takes
 //! nothing that would push it further out.
 
-use core::hint::cold_path;
+use crate::hint::cold_path;
 
 use super::terms::{FeedbackState, FeedbackTerms};
 use crate::scalar::{Quantity, Scalar};

@@ -1,6 +1,6 @@
 //! The monitors of each axis, one small pure step a tick each, without a division.
 
-use core::hint::cold_path;
+use crate::hint::cold_path;
 
 use crate::rounding;
 use crate::scalar::{Quantity, Scalar};

@@ -1,6 +1,6 @@
 //! 32-bit fixed point for a machine without a floating-point unit.
 
-use core::hint::cold_path;
+use crate::hint::cold_path;
 use core::ops::{Add, Neg, Sub};
 
 use super::number::{OCTAVE_INTERVAL_BITS, OctaveStart, Scalar};

@@ -1,7 +1,7 @@
 //! `f32` for the target and `f64` for the host. Plain IEEE operations in a fixed order: no fused multiply-add and no
 //! platform library, so that host and target agree to the bit.
 
-use core::hint::cold_path;
+use crate::hint::cold_path;
 
 use super::number::{OCTAVE_INTERVAL_BITS, OctaveStart, Scalar};
 use super::quantity::Quantity;

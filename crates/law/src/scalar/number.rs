@@ -1,7 +1,7 @@
 //! The operations that the control law needs of a number type.
 
+use crate::hint::cold_path;
 use core::fmt::Debug;
-use core::hint::cold_path;
 use core::ops::{Add, Neg, Sub};
 
 use super::quantity::Quantity;
