@@ -152,7 +152,6 @@ class ManyResult:
 
     def __repr__(self) -> str:
         failed = sum(fault is not None for fault in self.faults)
-        return (
-            f"ManyResult({len(self)} runs, {failed} with a fault, error "
-            f"{1e3 * np.nanmedian(self.rms_error_mm):.3g} um RMS in the median)"
-        )
+        rest = self.rms_error_mm[np.isfinite(self.rms_error_mm)]
+        median = f", error {1e3 * np.median(rest):.3g} um RMS in the median" if len(rest) else ""
+        return f"ManyResult({len(self)} runs, {failed} with a fault{median})"

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _quadrant
+from . import _quadrant, _values
 from ._plant import Mode, Plant
 from .friction import Curve
 
@@ -26,10 +26,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 __all__ = ["Frf", "Mode", "MotionModel", "MotionModels", "MotorConstant", "Plant", "PlantFit", "fit_tf", "frf", "motion", "motor_constant"]
-
-
-def _array(values: ArrayLike) -> Floats:
-    return np.ascontiguousarray(values, dtype=float)
 
 
 @dataclass(frozen=True)
@@ -61,14 +57,27 @@ class Frf:
         """Returns the response of python-control's ``FrequencyResponseData``; without a ``coherence`` every line is trusted."""
         if isinstance(data, cls):
             return data
-        response = np.ascontiguousarray(np.squeeze(data.frdata), dtype=complex)
+        # Its name before python-control 0.10.2 is fresp.
+        values = getattr(data, "frdata", None)
+        values = getattr(data, "fresp", None) if values is None else values
+        if values is None:
+            raise TypeError(
+                f"{type(data).__name__} is no frequency response; control.frd(system, 2 * numpy.pi * frequency_hz) makes one of a system"
+            )
+        response = np.ascontiguousarray(np.squeeze(values), dtype=complex)
+        if response.ndim != 1:
+            raise ValueError(f"the response has the shape {response.shape}: choose one output and one input, such as data[0, 0]")
         lines = np.asarray(data.omega, dtype=float) / (2 * np.pi)
         return cls(
             lines,
             response,
-            _array(getattr(data, "coherence", np.ones(len(lines)))),
-            _array(getattr(data, "relative_deviation", np.full(len(lines), 1e-3))),
+            _values.vector("coherence", getattr(data, "coherence", np.ones(len(lines)))),
+            _values.vector("relative_deviation", getattr(data, "relative_deviation", np.full(len(lines), 1e-3))),
         )
+
+    def _complex(self) -> NDArray[np.complex128]:
+        """Returns the response in double precision."""
+        return np.ascontiguousarray(self.response, dtype=complex)
 
     def plot(self, axes: Sequence[Axes] | None = None, label: str | None = None) -> Sequence[Axes]:
         """Plots gain, phase and coherence over the frequency; returns three axes of matplotlib."""
@@ -119,12 +128,12 @@ def frf(
     """
     low, high = band_hz
     found = _quadrant.frf(
-        _array(position),
-        _array(voltage),
-        1.0 / fs,
+        _values.vector("position", position),
+        _values.vector("voltage", voltage),
+        1.0 / _values.above_zero("fs", fs),
         nperseg,
         (low, min(high, fs)),
-        None if excitation is None else _array(excitation),
+        None if excitation is None else _values.vector("excitation", excitation),
     )
     return Frf(**found).to_control()
 
@@ -181,7 +190,7 @@ def fit_tf(
     measured = Frf.of(data)
     found = _quadrant.fit_tf(
         measured.frequency_hz,
-        measured.response,
+        measured._complex(),
         measured.coherence,
         measured.relative_deviation,
         least_coherence,
@@ -230,7 +239,12 @@ def motor_constant(position: ArrayLike, voltage: ArrayLike, fs: float, *, resolu
     resolution_mm : float
         Length of a count of the encoder, mm.
     """
-    return MotorConstant(**_quadrant.motor_constant(_array(position), _array(voltage), 1.0 / fs, resolution_mm))
+    return MotorConstant(**_quadrant.motor_constant(
+            _values.vector("position", position),
+            _values.vector("voltage", voltage),
+            1.0 / _values.above_zero("fs", fs),
+            resolution_mm,
+        ))
 
 
 @dataclass(frozen=True)
@@ -308,11 +322,11 @@ class MotionModels(Sequence[MotionModel]):
 
     def validate(self, position: ArrayLike, force: ArrayLike, sample_time_s: float) -> Floats:
         """Returns the relative error of each model on another motion, on which nothing is fitted, shape (models,)."""
-        return self._fitted.validate(_array(position), _array(force), sample_time_s)
+        return self._fitted.validate(_values.vector("position", position), _values.vector("force", force), sample_time_s)
 
     def replay(self, model: MotionModel, position: ArrayLike, force: ArrayLike, sample_time_s: float) -> Floats:
         """Returns the positions of a model that a motion's force drives in open loop, mm, at 1 kHz at most."""
-        return self._fitted.replay(self._models.index(model), _array(position), _array(force), sample_time_s)
+        return self._fitted.replay(self._models.index(model), _values.vector("position", position), _values.vector("force", force), sample_time_s)
 
 
 def motion(
@@ -348,6 +362,13 @@ def motion(
     """
     return MotionModels(
         _quadrant.fit_motion(
-            _array(position), _array(force), sample_time_s, cutoff_hz, edge_s, row_rate_hz, list(knots_mm), dead_time_s
+            _values.vector("position", position),
+            _values.vector("force", force),
+            sample_time_s,
+            cutoff_hz,
+            edge_s,
+            row_rate_hz,
+            list(knots_mm),
+            dead_time_s,
         )
     )

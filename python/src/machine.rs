@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 use std::sync::Mutex;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::thread;
-use std::time::Duration;
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
 
 use numpy::IntoPyArray;
 use pyo3::exceptions::{
@@ -40,7 +40,9 @@ type Job = Box<dyn FnOnce(&mut Client) + Send>;
 
 /// Time between two looks for signals, and at the machine while nothing is asked of it.
 const LOOK: Duration = Duration::from_millis(50);
-/// Longest time for which an interrupted request is waited for.
+/// Time between two looks whether a session has ended.
+const CLOSING: Duration = Duration::from_millis(1);
+/// Longest time for which an interrupted request, or the end of a session, is waited for.
 const GIVE_UP: Duration = Duration::from_secs(5);
 
 /// Place at which a machine is reached.
@@ -91,6 +93,11 @@ pub(crate) struct Session {
     jobs: Mutex<Option<Sender<Job>>>,
     interrupt: Interrupt,
     endpoint: String,
+    /// Requests that have no answer yet.
+    asked: AtomicUsize,
+    /// The process that opened it, and its thread there.
+    process: u32,
+    thread: JoinHandle<()>,
 }
 
 /// The exception of an error of a session.
@@ -143,6 +150,22 @@ fn serve(mut client: Client, jobs: &Receiver<Job>) {
     }
 }
 
+/// Waits for an answer, and looks for signals meanwhile; at an interrupt `give_up` is done. Nothing if there will be none.
+fn answered<T>(answers: &Receiver<T>, give_up: impl FnOnce()) -> PyResult<Option<T>> {
+    loop {
+        match answers.recv_timeout(LOOK) {
+            Ok(answer) => return Ok(Some(answer)),
+            Err(RecvTimeoutError::Timeout) => {
+                if let Err(error) = Python::attach(|py| py.check_signals()) {
+                    give_up();
+                    return Err(error);
+                }
+            }
+            Err(RecvTimeoutError::Disconnected) => return Ok(None),
+        }
+    }
+}
+
 impl Session {
     /// Has the session's thread do something; an interrupt stops the axes.
     fn ask<T: Send + 'static>(
@@ -150,6 +173,16 @@ impl Session {
         py: Python<'_>,
         work: impl FnOnce(&mut Client) -> T + Send + 'static,
     ) -> PyResult<T> {
+        if thread::current().id() == self.thread.thread().id() {
+            return Err(PyRuntimeError::new_err(
+                "the machine is busy with what calls this function, such as a commissioning its progress",
+            ));
+        }
+        if self.is_of_another_process() {
+            return Err(PyConnectionError::new_err(
+                "the machine was opened by another process: open it in this one",
+            ));
+        }
         let (answer, answers) = channel();
         let job: Job = Box::new(move |client| {
             // Nobody waits for it after an interrupt.
@@ -164,26 +197,41 @@ impl Session {
             return Err(closed());
         }
         let interrupt = self.interrupt.clone();
-        py.detach(move || {
-            loop {
-                match answers.recv_timeout(LOOK) {
-                    Ok(answer) => return Ok(answer),
-                    Err(RecvTimeoutError::Timeout) => {
-                        if let Err(error) = Python::attach(|py| py.check_signals()) {
-                            interrupt.request();
-                            let _ = answers.recv_timeout(GIVE_UP);
-                            return Err(error);
-                        }
-                    }
-                    Err(RecvTimeoutError::Disconnected) => return Err(closed()),
-                }
-            }
-        })
+        self.asked.fetch_add(1, Ordering::Relaxed);
+        let answer = py.detach(move || {
+            answered(&answers, || {
+                interrupt.request();
+                let _ = answers.recv_timeout(GIVE_UP);
+            })
+        });
+        self.asked.fetch_sub(1, Ordering::Relaxed);
+        answer?.ok_or_else(closed)
     }
 
     fn order(&self, py: Python<'_>, body: Body) -> PyResult<()> {
         self.ask(py, move |client| client.order(body))?
             .map_err(client_error)
+    }
+
+    /// True in a process that was forked: the session's thread is not in it.
+    fn is_of_another_process(&self) -> bool {
+        std::process::id() != self.process
+    }
+
+    /// An order that does not wait for what another thread has asked for: that ends.
+    fn order_at_once(&self, py: Python<'_>, body: Body) -> PyResult<()> {
+        if self.asked.load(Ordering::Relaxed) > 0 {
+            self.interrupt.request();
+        }
+        let again = body.clone();
+        let order = move |client: &mut Client| match client.order(body) {
+            Err(ClientError::Interrupted { .. }) => {
+                client.resume();
+                client.order(again)
+            }
+            outcome => outcome,
+        };
+        self.ask(py, order)?.map_err(client_error)
     }
 }
 
@@ -312,7 +360,7 @@ impl Session {
         let (jobs, received) = channel();
         let (opened, opening) = channel();
         // Transports stay on the thread that opened them.
-        thread::spawn(move || match place.open() {
+        let session = thread::spawn(move || match place.open() {
             Ok(client) => {
                 let _ = opened.send(Ok((client.interrupt(), client.endpoint())));
                 serve(client, &received);
@@ -321,14 +369,18 @@ impl Session {
                 let _ = opened.send(Err(reason));
             }
         });
-        let opened = py.detach(move || opening.recv());
+        // After an interrupt it opens, has no jobs, and closes.
+        let opened = py.detach(move || answered(&opening, || {}))?;
         let (interrupt, endpoint) = opened
-            .map_err(|_| PyConnectionError::new_err("the session has ended before it began"))?
+            .ok_or_else(|| PyConnectionError::new_err("the session has ended before it began"))?
             .map_err(PyConnectionError::new_err)?;
         Ok(Self {
             jobs: Mutex::new(Some(jobs)),
             interrupt,
             endpoint,
+            asked: AtomicUsize::new(0),
+            process: std::process::id(),
+            thread: session,
         })
     }
 
@@ -358,11 +410,11 @@ impl Session {
     }
 
     fn disable(&self, py: Python<'_>) -> PyResult<()> {
-        self.order(py, Body::Disable)
+        self.order_at_once(py, Body::Disable)
     }
 
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
-        self.order(py, Body::Stop)
+        self.order_at_once(py, Body::Stop)
     }
 
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
@@ -589,10 +641,19 @@ impl Session {
         commission::result(py, outcome, raised, &stage, name)
     }
 
-    /// Ends the session.
-    fn close(&self) {
+    /// Ends the session, and waits until its port is free.
+    fn close(&self, py: Python<'_>) {
         if let Ok(mut jobs) = self.jobs.lock() {
             jobs.take();
         }
+        if thread::current().id() == self.thread.thread().id() || self.is_of_another_process() {
+            return;
+        }
+        py.detach(|| {
+            let since = Instant::now();
+            while !self.thread.is_finished() && since.elapsed() < GIVE_UP {
+                thread::sleep(CLOSING);
+            }
+        });
     }
 }
