@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,10 +12,8 @@ from . import _quadrant, _values
 from ._quadrant import Settings, Stage
 from .design import Margins
 from .friction import Curve, Gms, Stribeck
-from .identify import Frf, Mode, MotorConstant, Plant, PlantFit
+from .identify import Frf, Mode, MotorConstant, Plant, PlantFit, Progress
 from .machine import Machine
-
-Progress = Callable[[str, float], object]
 
 
 @dataclass(frozen=True)
@@ -130,8 +127,8 @@ def commission(
     Returns
     -------
     Commissioned
-        ``settings`` are complete: what was not commissioned is as it was. On a machine nothing is stored: `Machine.load` and
-        `Machine.store` do.
+        ``settings`` are complete: what was not commissioned is as it was. A machine has the settings in force that it had before, its
+        outputs off: `Machine.load` and `Machine.store` put these in force and keep them.
 
     Raises
     ------

@@ -143,6 +143,7 @@ _Plant = tuple[float, float, float, float]
 _Modes = Sequence[Any]
 _Gains = tuple[float, float, float, float]
 _Complex = NDArray[np.complex128]
+_FrfRequest = tuple[str, float, tuple[float, float], float, float, int, float, bool]
 
 def friction_static(positive: _Side, negative: _Side, velocity: ArrayLike) -> _Floats: ...
 def friction_force(
@@ -244,6 +245,9 @@ def npid(
     range_mm: float,
     largest: float,
 ) -> tuple[float, float] | None: ...
+def measure_frf_simulated(
+    stage: Stage, settings: Settings, axis: str, request: _FrfRequest, seed: int, progress: object | None
+) -> dict[str, Any]: ...
 def commission_simulated(
     stage: Stage, axis: str, seed: int, trials: bool, progress: object | None
 ) -> dict[str, Any]: ...
@@ -294,5 +298,14 @@ class Session:
     def record(self, channels: Sequence[str], seconds: float, decimation: int | None = None) -> dict[str, Any]: ...
     def commission(
         self, axis: str, travel_mm: tuple[float, float] | None, trials: bool, progress: object | None
+    ) -> dict[str, Any]: ...
+    def measure_frf(
+        self,
+        settings: Settings | None,
+        axis: str,
+        travel_mm: tuple[float, float] | None,
+        request: _FrfRequest,
+        seed: int,
+        progress: object | None,
     ) -> dict[str, Any]: ...
     def close(self) -> None: ...

@@ -8,7 +8,7 @@ Reference Models of EMPS, 2019.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,15 +17,31 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _quadrant, _values
 from ._plant import Mode, Plant
+from ._quadrant import Settings, Stage
 from .friction import Curve
+from .machine import Machine
 
 if TYPE_CHECKING:
     import control
     from matplotlib.axes import Axes
 
 Floats = NDArray[np.float64]
+Progress = Callable[[str, float], object]
 
-__all__ = ["Frf", "Mode", "MotionModel", "MotionModels", "MotorConstant", "Plant", "PlantFit", "fit_tf", "frf", "motion", "motor_constant"]
+__all__ = [
+    "Frf",
+    "Mode",
+    "MotionModel",
+    "MotionModels",
+    "MotorConstant",
+    "Plant",
+    "PlantFit",
+    "fit_tf",
+    "frf",
+    "measure_frf",
+    "motion",
+    "motor_constant",
+]
 
 
 @dataclass(frozen=True)
@@ -135,6 +151,91 @@ def frf(
         (low, min(high, fs)),
         None if excitation is None else _values.vector("excitation", excitation),
     )
+    return Frf(**found).to_control()
+
+
+def measure_frf(
+    machine: Stage | Machine,
+    axis: str = "x",
+    *,
+    settings: Settings | None = None,
+    velocity_mm_s: float = 37.0,
+    open_loop: bool = False,
+    waveform: str = "multisine",
+    rms_v: float | None = None,
+    band_hz: tuple[float, float] = (4.0, 400.0),
+    rise_hz: float = 200.0,
+    period_s: float = 0.5,
+    averages: int = 40,
+    travel_mm: tuple[float, float] | None = None,
+    seed: int = 1,
+    progress: Progress | None = None,
+) -> control.FrequencyResponseData:
+    """Measures the frequency response of an axis: injects a voltage while the axis slides under its PID alone, or in open loop at rest.
+
+    Parameters
+    ----------
+    machine : Machine or Stage
+        The machine, or a simulated stage.
+    axis : {"x", "y", "z"}
+    settings : Settings, optional
+        Of these the PID moves the axis; by default those in force. A stage needs them.
+    velocity_mm_s : float
+        Velocity meanwhile, mm/s, there and back; 0 measures at standstill, where friction bends the response.
+    open_loop : bool
+        True: the excitation alone drives the amplifier, at standstill.
+    waveform : {"multisine", "random", "sweep"}
+    rms_v : float, optional
+        RMS of the excitation, V; by default 0.3 at standstill, else 0.08 of a multisine and 0.035 of the others.
+    band_hz : (float, float)
+        Lowest and highest frequency, Hz.
+    rise_hz : float
+        Frequency up to which a multisine's amplitudes rise, Hz.
+    period_s : float
+        Period of the excitation, s; its inverse is the resolution.
+    averages : int
+        Blocks that are averaged, 2 or more.
+    travel_mm : (float, float), optional
+        Ways to both ends from where the axis of a machine stands, such as (-200, 200); a homed axis knows it.
+    seed : int
+        Decides phases and, of a stage, the encoder's noise.
+    progress : function of step and share, optional
+        As of `quadrant.commission`.
+
+    Returns
+    -------
+    control.FrequencyResponseData
+        As of `frf`. A machine's outputs are off then, and its settings are as before.
+
+    Raises
+    ------
+    RuntimeError
+        A measurement that was stopped, or that cannot be, with reason and remedy.
+    KeyboardInterrupt
+        At Ctrl-C; the axis stops.
+    """
+    slides = velocity_mm_s != 0.0 and not open_loop
+    usual = (0.08 if waveform == "multisine" else 0.035) if slides else 0.3
+    request = (
+        waveform,
+        usual if rms_v is None else rms_v,
+        band_hz,
+        rise_hz,
+        period_s,
+        averages,
+        velocity_mm_s if slides else 0.0,
+        open_loop,
+    )
+    if isinstance(machine, Stage):
+        if travel_mm is not None:
+            raise ValueError("travel_mm is of a machine; that of a stage is its own: Stage(travel_mm=(-200, 200))")
+        if settings is None:
+            raise ValueError("settings: a stage has no law of its own; give those of a commissioning, or Settings.simulated()")
+        found = _quadrant.measure_frf_simulated(machine, settings, axis, request, _values.seed(seed), progress)
+    elif isinstance(machine, Machine):
+        found = machine._session.measure_frf(settings, axis, travel_mm, request, _values.seed(seed), progress)
+    else:
+        raise TypeError(f"{machine!r}: give a quadrant.Stage or a quadrant.Machine")
     return Frf(**found).to_control()
 
 

@@ -178,7 +178,7 @@ pub(crate) fn friction_force<'py>(
     };
     let (velocity, position) = (finite("v", &velocity)?, finite("x", &position)?);
     same_length(("v", velocity.len()), &[("x", position.len())])?;
-    let force = py.detach(|| {
+    let force = left_behind(py, move |_| {
         let mut presliding = Presliding::new(&axis, step_s);
         let mut last = position.first().copied().unwrap_or(0.0);
         let samples = velocity.iter().zip(&position);
@@ -190,7 +190,7 @@ pub(crate) fn friction_force<'py>(
                 force + side.viscous_v_s_per_mm * v
             })
             .collect::<Vec<f64>>()
-    });
+    })?;
     Ok(force.into_pyarray(py))
 }
 

@@ -25,11 +25,12 @@ use quadrant_link::message::{
     AxisName as LinkAxis, AxisSet, Body, Channel, Harmonic, Motion as LinkMotion, Plan,
     PointToPoint, Status,
 };
+use quadrant_settings::StageSettings;
 use quadrant_sim::stage_setup::StageSetup;
 use quadrant_tune::commission::CommissionSettings;
-use quadrant_tune::test_axis::Travel;
+use quadrant_tune::test_axis::{TestAxis, Travel};
 
-use crate::commission;
+use crate::commission::{self, FrfRequest};
 use crate::references::Motion;
 use crate::settings::{Settings, axis_name};
 use crate::stage::Stage;
@@ -275,6 +276,55 @@ fn duration(name: &str, seconds: f64) -> PyResult<Duration> {
     Duration::try_from_secs_f64(seconds).map_err(|_| {
         PyValueError::new_err(format!("{name} = {seconds}: a time of zero or more, s"))
     })
+}
+
+/// Refuses a travel that is none.
+fn check_travel(travel_mm: Option<(f64, f64)>) -> PyResult<()> {
+    match travel_mm {
+        Some((negative, positive))
+            if !(negative <= 0.0 && positive >= 0.0 && negative < positive) =>
+        {
+            Err(PyValueError::new_err(format!(
+                "travel_mm = ({negative}, {positive}): the ways to both ends from where the axis stands, such as (-200, 200)"
+            )))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What was done on an axis, the settings that the machine had before, and the reason if it has not taken them back.
+type Done<T> = (T, StageSettings, Result<(), String>);
+
+/// Does something on an axis under test, then switches the outputs off and puts the settings back that the machine had.
+fn on_axis<T>(
+    client: &mut Client,
+    name: AxisName,
+    travel_mm: Option<(f64, f64)>,
+    work: impl FnOnce(&mut dyn TestAxis, &StageSettings) -> T,
+) -> Result<Done<T>, String> {
+    let before = Measured::settings(client).map_err(|error| errors::words(&error))?;
+    let known = Measured::free_travel(client, name).map_err(|error| errors::words(&error))?;
+    let travel = match travel_mm {
+        Some((negative, positive)) => Travel::between([negative, positive]),
+        None if client.simulated_io().is_some() => known.unwrap_or(Travel::BUILT_IN),
+        None => known.ok_or_else(|| {
+            "the travel is not known: home the axis, or give travel_mm".to_owned()
+        })?,
+    };
+    let outcome = {
+        let mut axis =
+            Measured::test_axis(client, name, travel).map_err(|error| errors::words(&error))?;
+        work(axis.as_mut(), &before)
+    };
+    // An interrupt has ended the work, not the session.
+    client.resume();
+    let restored = Measured::load(client, &before).map_err(|error| {
+        format!(
+            "the machine did not take its old settings back: {}",
+            errors::words(&error)
+        )
+    });
+    Ok((outcome, before, restored))
 }
 
 fn status_dict<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyDict>> {
@@ -603,42 +653,59 @@ impl Session {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let name = axis_name(axis)?;
-        if let Some((negative, positive)) = travel_mm
-            && !(negative <= 0.0 && positive >= 0.0 && negative < positive)
-        {
-            return Err(PyValueError::new_err(format!(
-                "travel_mm = ({negative}, {positive}): the ways to both ends from where the axis stands, such as (-200, 200)"
-            )));
-        }
+        check_travel(travel_mm)?;
         let request = CommissionSettings {
             trials,
             ..CommissionSettings::default()
         };
-        let (outcome, stage, raised) = self
-            .ask(py, move |client| {
-                let stage = Measured::settings(client).map_err(|error| errors::words(&error))?;
-                let known =
-                    Measured::free_travel(client, name).map_err(|error| errors::words(&error))?;
-                let travel = match travel_mm {
-                    Some((negative, positive)) => Travel::between([negative, positive]),
-                    None if client.simulated_io().is_some() => known.unwrap_or(Travel::BUILT_IN),
-                    None => known.ok_or_else(|| {
-                        "the travel is not known: home the axis, or give travel_mm".to_owned()
-                    })?,
-                };
-                let raised = Mutex::new(None);
-                let cancelled = AtomicBool::new(false);
-                let outcome = {
-                    let mut axis = Measured::test_axis(client, name, travel)
-                        .map_err(|error| errors::words(&error))?;
-                    let base = &stage.axes[name as usize];
-                    let calls = (progress.as_ref(), &raised);
-                    commission::run(axis.as_mut(), base, &request, calls, &cancelled)
-                };
-                Ok((outcome, stage, raised))
-            })?
-            .map_err(|reason: String| PyRuntimeError::new_err(reason))?;
-        commission::result(py, outcome, raised, &stage, name)
+        let raised = Mutex::new(None);
+        let (done, raised) = self.ask(py, move |client| {
+            let done = on_axis(client, name, travel_mm, |axis, stage| {
+                let base = &stage.axes[name as usize];
+                let calls = (progress.as_ref(), &raised);
+                commission::run(axis, base, &request, calls, &AtomicBool::new(false))
+            });
+            (done, raised)
+        })?;
+        let (outcome, stage, restored) = done.map_err(PyRuntimeError::new_err)?;
+        let found = commission::result(py, outcome, raised, &stage, name)?;
+        restored.map_err(PyRuntimeError::new_err)?;
+        Ok(found)
+    }
+
+    /// Measures the response of an axis.
+    #[pyo3(signature = (settings, axis, travel_mm, request, seed, progress))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "a function of the extension, wrapped in Python"
+    )]
+    fn measure_frf<'py>(
+        &self,
+        py: Python<'py>,
+        settings: Option<&Settings>,
+        axis: &str,
+        travel_mm: Option<(f64, f64)>,
+        request: FrfRequest,
+        seed: u64,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let name = axis_name(axis)?;
+        check_travel(travel_mm)?;
+        let request = commission::frf_settings(request, seed)?;
+        let own = settings.map(|settings| settings.file.stage.axes[name as usize].clone());
+        let raised = Mutex::new(None);
+        let (done, raised) = self.ask(py, move |client| {
+            let done = on_axis(client, name, travel_mm, |axis, stage| {
+                let base = own.as_ref().unwrap_or(&stage.axes[name as usize]);
+                let calls = (progress.as_ref(), &raised);
+                commission::measure_response(axis, base, &request, calls, &AtomicBool::new(false))
+            });
+            (done, raised)
+        })?;
+        let (measured, _, restored) = done.map_err(PyRuntimeError::new_err)?;
+        let found = commission::measured_dict(py, measured, raised)?;
+        restored.map_err(PyRuntimeError::new_err)?;
+        Ok(found)
     }
 
     /// Ends the session, and waits until its port is free.
