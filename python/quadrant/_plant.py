@@ -52,6 +52,7 @@ class Plant:
 
     def to_control(self, pade: int | None = 3) -> control.TransferFunction:
         """Returns python-control's transfer function; the dead time by a Padé approximation of that order, or left out (None)."""
+        _values.needs("control")
         import control
 
         found = control.tf([self.gain_mm_per_v_s2], [1.0, self.damping_per_s, self.stiffness_per_s2])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import operator
 from typing import Any
 
@@ -80,3 +81,11 @@ def seed(value: Any) -> int:
     if not 0 <= found < 2**64:
         raise ValueError(f"seed = {found}: it must be 0 to 2**64 - 1")
     return found
+
+
+def needs(package: str) -> None:
+    """Raises `ModuleNotFoundError`, with the remedy, if a package that is not always installed is missing."""
+    try:
+        importlib.import_module(package)
+    except ImportError:
+        raise ModuleNotFoundError(f'this needs {package}: pip install {package}, or "quadrant-servo[all]"', name=package) from None

@@ -45,6 +45,7 @@ class Recording:
 
     def to_pandas(self) -> pandas.DataFrame:
         """Returns a data frame with a column for each signal, indexed by ``t_s``."""
+        _values.needs("pandas")
         import pandas
 
         frame: pandas.DataFrame = pandas.DataFrame(_signals(self)).set_index("t_s")
@@ -101,6 +102,7 @@ def to_csv(source: Result | Recording, path: Path) -> None:
 
 def to_parquet(source: Result | Recording | Mapping[str, ArrayLike] | pandas.DataFrame, path: Path) -> None:
     """Writes signals as a Parquet file, a column each; needs pandas and pyarrow."""
+    _values.needs("pandas")
     import pandas
 
     pandas.DataFrame(_signals(source)).to_parquet(path)
@@ -108,6 +110,7 @@ def to_parquet(source: Result | Recording | Mapping[str, ArrayLike] | pandas.Dat
 
 def to_mat(source: Result | Recording | Mapping[str, ArrayLike] | pandas.DataFrame, path: Path) -> None:
     """Writes signals as a MAT file of version 5, a column vector each, for MATLAB; needs SciPy."""
+    _values.needs("scipy")
     from scipy.io import savemat
 
     signals = {name.replace(".", "_").replace("-", "_"): values for name, values in _signals(source).items()}
@@ -116,6 +119,7 @@ def to_mat(source: Result | Recording | Mapping[str, ArrayLike] | pandas.DataFra
 
 def read_mat(path: Path, *, time: str, position: str, voltage: str, reference: str | None = None) -> Recording:
     """Reads a recording from a MAT file by the names of its variables: time in s, evenly spaced, position in mm and voltage in V."""
+    _values.needs("scipy")
     from scipy.io import loadmat
 
     found = loadmat(fspath(path), squeeze_me=True)

@@ -86,6 +86,7 @@ class Stribeck:
 
 def _plotted(axes: Axes | None, x: Floats, y: Floats, name: str, label: str | None) -> Axes:
     if axes is None:
+        _values.needs("matplotlib")
         import matplotlib.pyplot as plt
 
         axes = plt.subplots()[1]

@@ -61,6 +61,7 @@ class Frf:
 
     def to_control(self) -> control.FrequencyResponseData:
         """Returns python-control's ``FrequencyResponseData``, with ``coherence`` and ``relative_deviation`` as attributes."""
+        _values.needs("control")
         import control
 
         found = control.FrequencyResponseData(self.response, 2 * np.pi * self.frequency_hz, smooth=True)
@@ -98,6 +99,7 @@ class Frf:
     def plot(self, axes: Sequence[Axes] | None = None, label: str | None = None) -> Sequence[Axes]:
         """Plots gain, phase and coherence over the frequency; returns three axes of matplotlib."""
         if axes is None:
+            _values.needs("matplotlib")
             import matplotlib.pyplot as plt
 
             axes = list(plt.subplots(3, 1, sharex=True)[1])
@@ -214,6 +216,7 @@ def measure_frf(
     KeyboardInterrupt
         At Ctrl-C; the axis stops.
     """
+    _values.needs("control")
     slides = velocity_mm_s != 0.0 and not open_loop
     usual = (0.08 if waveform == "multisine" else 0.035) if slides else 0.3
     request = (

@@ -202,6 +202,7 @@ class Machine:
             A column for each channel (positions and errors in mm, velocities in mm/s, voltages in V), indexed by ``t_s``, the time in s.
             ``frame.attrs["lost"]`` is the number of samples that were lost on the way.
         """
+        _values.needs("pandas")
         import pandas
 
         found = self._session.record(_names(channels), seconds, decimation)
@@ -217,6 +218,7 @@ class Machine:
 
     def live_plot(self, channels: str | Sequence[str], seconds: float = 10.0, *, every_s: float = 0.5) -> None:
         """Plots channels while they come, in a notebook or in a window of matplotlib."""
+        _values.needs("matplotlib")
         import matplotlib.pyplot as plt
 
         figure, axes = plt.subplots()

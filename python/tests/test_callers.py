@@ -6,6 +6,7 @@ import copy
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 import warnings
@@ -325,3 +326,15 @@ def test_settings_that_were_copied_are_changed_alone() -> None:
     other = copy.copy(SETTINGS)
     other["rate_hz"] = 8000.0
     assert SETTINGS["rate_hz"] == 10_000.0
+
+
+def test_a_package_that_is_missing_is_named_before_anything_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = quadrant.simulate(SETTINGS, MOTION)
+    for package in ("control", "pandas", "matplotlib"):
+        monkeypatch.setitem(sys.modules, package, None)
+    calls: list[Callable[[], object]] = [run.plot, run.to_pandas, PLANT.to_control]
+    for call in calls:
+        with pytest.raises(ModuleNotFoundError, match="pip install"):
+            call()
+    with pytest.raises(ModuleNotFoundError, match="control"):
+        identify.measure_frf(quadrant.Stage(), settings=SETTINGS, progress=lambda step, share: pytest.fail(step))
