@@ -57,7 +57,7 @@ def simulate(
     ValueError
         Settings that are refused, or a reference that is none.
     KeyboardInterrupt
-        Within 0.1 s of Ctrl-C. Python's lock is released meanwhile.
+        Within a second of Ctrl-C. Python's lock is released meanwhile.
     """
     given = (
         {name: _values.reference(of) for name, of in reference.items()}
