@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
 from types import TracebackType
@@ -15,6 +16,17 @@ if TYPE_CHECKING:
     import pandas
 
 __all__ = ["Machine"]
+
+
+def _forget(session: _quadrant.Session) -> None:
+    """Disables the outputs of a machine that nobody has closed, when nothing refers to it or the program ends."""
+    try:
+        session.disable()
+    except (OSError, RuntimeError):
+        # It is closed already, or does not answer any more.
+        pass
+    finally:
+        session.close()
 
 
 def _names(channels: str | Sequence[str]) -> list[str]:
@@ -71,6 +83,7 @@ class Machine:
             place = "emulated:target/images/mps2-f32.elf"
         self._session = _quadrant.Session(place, stage, settings, _values.seed(seed), flash)
         self._closed = False
+        weakref.finalize(self, _forget, self._session)
 
     def __enter__(self) -> Machine:
         return self

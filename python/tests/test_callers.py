@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import gc
 import multiprocessing
 import os
 import signal
@@ -10,6 +11,7 @@ import sys
 import threading
 import time
 import warnings
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,6 +20,7 @@ import pytest
 
 import quadrant
 from quadrant import design, files, friction, identify
+from quadrant.machine import _forget
 
 SETTINGS = quadrant.Settings.simulated()
 MOTION = quadrant.Motion.sine(1.0, 20.0, cycles=0.25, lead_s=0.1)
@@ -255,6 +258,28 @@ def test_a_machine_that_is_left_twice_is_left_once_and_one_channel_is_a_name() -
                 next(machine.watch("x.error", 1.0, every_s=0.0))
             machine.close()
         machine.close()
+
+
+def test_a_machine_that_nobody_closes_is_disabled_when_nothing_refers_to_it() -> None:
+    machine = quadrant.Machine("simulated:commissioned")
+    machine.enable()
+    session, orders = machine._session, []
+
+    class Watched:
+        def disable(self) -> None:
+            session.disable()
+            orders.append(session.status()["state"])
+
+        def close(self) -> None:
+            session.close()
+
+    finalizer = weakref.finalize(machine, _forget, Watched())  # type: ignore[arg-type]
+    finalizer()
+    assert orders == ["disabled"]
+    del machine
+    gc.collect()
+    with pytest.raises(ConnectionError, match="closed"):
+        session.status()
 
 
 def test_progress_cannot_wait_for_the_machine_that_is_commissioned() -> None:
