@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _quadrant
+from . import _quadrant, _values
 from ._quadrant import Settings, Stage
 from .design import Margins
 from .friction import Curve, Gms, Stribeck
-from .identify import Frf, Mode, MotorConstant, Plant, PlantFit
-
-if TYPE_CHECKING:
-    from .machine import Machine
-
-Progress = Callable[[str, float], object]
+from .identify import Frf, Mode, MotorConstant, Plant, PlantFit, Progress
+from .machine import Machine
 
 
 @dataclass(frozen=True)
@@ -132,8 +127,8 @@ def commission(
     Returns
     -------
     Commissioned
-        ``settings`` are complete: what was not commissioned is as it was. On a machine nothing is stored: `Machine.load` and
-        `Machine.store` do.
+        ``settings`` are complete: what was not commissioned is as it was. A machine has the settings in force that it had before, its
+        outputs off: `Machine.load` and `Machine.store` put these in force and keep them.
 
     Raises
     ------
@@ -143,7 +138,11 @@ def commission(
         At Ctrl-C; the axis stops.
     """
     if isinstance(machine, Stage):
-        found = _quadrant.commission_simulated(machine, axis, seed, trials, progress)
+        if travel_mm is not None:
+            raise ValueError("travel_mm is of a machine; that of a stage is its own: Stage(travel_mm=(-200, 200))")
+        found = _quadrant.commission_simulated(machine, axis, _values.seed(seed), trials, progress)
+    elif isinstance(machine, Machine):
+        found = machine._session.commission(axis, travel_mm, trials, progress)
     else:
-        found = machine._commission(axis, travel_mm, trials, progress)
+        raise TypeError(f"{machine!r}: give a quadrant.Stage or a quadrant.Machine")
     return _commissioned(axis, found)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Union
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _quadrant
+from . import _quadrant, _values
 from ._result import Result
 
 Reference = Union[_quadrant.Motion, ArrayLike, "tuple[ArrayLike, ArrayLike, ArrayLike]"]
@@ -37,7 +36,7 @@ class Axis(_quadrant.Axis):
         quadrant.Fault
             What the law's monitors found, with its tick.
         ValueError
-            Arrays that are not equally long, or values that are not finite.
+            Arrays that are not equally long, values that are not finite, or counts that are not whole.
         """
-        wide = np.ascontiguousarray(counts, dtype=np.int64)
-        return Result(rate_hz=self.rate_hz, resolution_mm=self.resolution_mm, **self.run_arrays(reference, wide))
+        signals = self.run_arrays(_values.reference(reference), _values.whole("counts", counts))
+        return Result(rate_hz=self.rate_hz, resolution_mm=self.resolution_mm, **signals)

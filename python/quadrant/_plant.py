@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _quadrant
+from . import _quadrant, _values
 
 if TYPE_CHECKING:
     import control
@@ -45,12 +45,14 @@ class Plant:
         return (self.gain_mm_per_v_s2, self.damping_per_s, self.stiffness_per_s2, self.delay_s)
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
-        """Returns the response at frequencies, Hz, mm/V."""
-        lines = np.ascontiguousarray(np.atleast_1d(frequency_hz), dtype=float)
-        return _quadrant.plant_response(self.numbers(), [tuple(mode) for mode in self.modes], lines)
+        """Returns the response at frequencies, Hz, mm/V, in the shape of the frequencies."""
+        lines = _values.real("frequency_hz", frequency_hz)
+        modes = [tuple(mode) for mode in self.modes]
+        return _quadrant.plant_response(self.numbers(), modes, lines.ravel()).reshape(lines.shape)
 
     def to_control(self, pade: int | None = 3) -> control.TransferFunction:
         """Returns python-control's transfer function; the dead time by a Padé approximation of that order, or left out (None)."""
+        _values.needs("control")
         import control
 
         found = control.tf([self.gain_mm_per_v_s2], [1.0, self.damping_per_s, self.stiffness_per_s2])

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _values
+
 if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
@@ -84,6 +86,7 @@ class Result:
 
     def to_pandas(self) -> pandas.DataFrame:
         """Returns a data frame with a column for each signal, indexed by the time in s."""
+        _values.needs("pandas")
         import pandas
 
         frame: pandas.DataFrame = pandas.DataFrame(self.to_dict()).set_index("t_s")
@@ -92,6 +95,7 @@ class Result:
     def plot(self, axes: Axes | None = None, label: str | None = None) -> Axes:
         """Plots the error in um over the time in s; returns the axes of matplotlib."""
         if axes is None:
+            _values.needs("matplotlib")
             import matplotlib.pyplot as plt
 
             axes = plt.subplots()[1]
@@ -152,7 +156,6 @@ class ManyResult:
 
     def __repr__(self) -> str:
         failed = sum(fault is not None for fault in self.faults)
-        return (
-            f"ManyResult({len(self)} runs, {failed} with a fault, error "
-            f"{1e3 * np.nanmedian(self.rms_error_mm):.3g} um RMS in the median)"
-        )
+        rest = self.rms_error_mm[np.isfinite(self.rms_error_mm)]
+        median = f", error {1e3 * np.median(rest):.3g} um RMS in the median" if len(rest) else ""
+        return f"ManyResult({len(self)} runs, {failed} with a fault{median})"

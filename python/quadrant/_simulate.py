@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import overload
 
-from . import _quadrant
+import numpy as np
+
+from . import _quadrant, _values
 from ._law import Reference
 from ._quadrant import Settings, Stage
 from ._result import ManyResult, SimulationResult
@@ -55,10 +57,14 @@ def simulate(
     ValueError
         Settings that are refused, or a reference that is none.
     KeyboardInterrupt
-        Within 0.1 s of Ctrl-C. Python's lock is released meanwhile.
+        Within a second of Ctrl-C. Python's lock is released meanwhile.
     """
-    of_axes = dict(reference) if isinstance(reference, Mapping) else reference
-    found = _quadrant.simulate(settings, of_axes, stage or Stage(), axis, seed)
+    given = (
+        {name: _values.reference(of) for name, of in reference.items()}
+        if isinstance(reference, Mapping)
+        else _values.reference(reference)
+    )
+    found = _quadrant.simulate(settings, given, stage or Stage(), axis, _values.seed(seed))
     results = {
         name: SimulationResult(
             rate_hz=settings.rate_hz, resolution_mm=settings[f"{name}/encoder/resolution_mm"], **signals
@@ -88,7 +94,7 @@ def simulate_many(
     seeds : int or iterable of int
         Seed of each run; a number is that of all.
     keep : sequence of str
-        Signals to keep of every run: "error_mm", "position_mm", "output_v", "feedforward_v", "friction_v".
+        Signals to keep of every run, 8 bytes a sample: "error_mm", "position_mm", "output_v", "feedforward_v", "friction_v".
 
     Returns
     -------
@@ -97,8 +103,9 @@ def simulate_many(
     """
     all_settings = [settings] if isinstance(settings, Settings) else list(settings)
     stages = [stage or Stage()] if stage is None or isinstance(stage, Stage) else list(stage)
-    all_seeds = [seeds] if isinstance(seeds, int) else [int(seed) for seed in seeds]
-    found = _quadrant.simulate_many(all_settings, reference, stages, axis, all_seeds, list(keep))
+    all_seeds = [_values.seed(seed) for seed in ([seeds] if isinstance(seeds, (int, np.integer)) else seeds)]
+    kept = [keep] if isinstance(keep, str) else list(keep)
+    found = _quadrant.simulate_many(all_settings, _values.reference(reference), stages, axis, all_seeds, kept)
     return ManyResult(
         largest_error_mm=found.pop("largest_error_mm"),
         rms_error_mm=found.pop("rms_error_mm"),

@@ -11,7 +11,7 @@ from typing import Any, Union
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _quadrant
+from . import _quadrant, _values
 from ._plant import Plant
 from ._quadrant import Settings
 from .identify import Frf, PlantFit
@@ -81,7 +81,13 @@ def _process(process: Process, least_coherence: float = 0.9) -> _quadrant.Proces
     if isinstance(process, Plant):
         return _quadrant.Process.model(process.numbers(), [tuple(mode) for mode in process.modes])
     measured = Frf.of(process)
-    return _quadrant.Process.measured(measured.frequency_hz, measured.response, measured.coherence, least_coherence)
+    return _quadrant.Process.measured(measured.frequency_hz, measured._complex(), measured.coherence, least_coherence)
+
+
+def _numbers(gains: PidGains) -> tuple[float, float, float, float]:
+    if not isinstance(gains, PidGains):
+        raise TypeError(f"gains = {gains!r}: give a quadrant.design.PidGains")
+    return gains.numbers()
 
 
 def pid(
@@ -124,12 +130,13 @@ def pid(
 
 def margins(plant: Process, gains: PidGains, *, rate_hz: float | None = 10_000.0, computation_delay_s: float = 0.0) -> Margins:
     """Returns the margins of the loop that a PID closes, sampled at ``rate_hz`` as the firmware runs it, or in continuous time (None)."""
-    return Margins(**_quadrant.margins(_process(plant), gains.numbers(), rate_hz, computation_delay_s))
+    return Margins(**_quadrant.margins(_process(plant), _numbers(gains), rate_hz, computation_delay_s))
 
 
 def load_error(plant: Process, gains: PidGains, *, rate_hz: float | None = 10_000.0, computation_delay_s: float = 0.0) -> float:
-    """Returns the square root of the integral of the squared error after a step of the load of 1 V, mm sqrt(s)."""
-    return _quadrant.load_error(_process(plant), gains.numbers(), rate_hz, computation_delay_s)
+    """Returns the square root of the integral of the squared error after a step of the load of 1 V, mm sqrt(s); infinity without an integral
+    gain. Raises `ValueError` for a loop that is unstable."""
+    return _quadrant.load_error(_process(plant), _numbers(gains), rate_hz, computation_delay_s)
 
 
 def open_loop(
@@ -140,9 +147,10 @@ def open_loop(
     rate_hz: float | None = 10_000.0,
     computation_delay_s: float = 0.0,
 ) -> NDArray[np.complex128]:
-    """Returns the open loop's response at frequencies, Hz."""
-    lines = np.ascontiguousarray(np.atleast_1d(frequency_hz), dtype=float)
-    return _quadrant.open_loop(_process(plant), gains.numbers(), rate_hz, lines, computation_delay_s)
+    """Returns the open loop's response at frequencies, Hz, in the shape of the frequencies."""
+    lines = _values.real("frequency_hz", frequency_hz)
+    found = _quadrant.open_loop(_process(plant), _numbers(gains), rate_hz, lines.ravel(), computation_delay_s)
+    return found.reshape(lines.shape)
 
 
 @dataclass(frozen=True)
@@ -165,8 +173,9 @@ def _rigid(plant: Process) -> Plant:
 
 
 def popov(plant: Plant | PlantFit, gains: PidGains, *, rate_hz: float = 10_000.0) -> Popov:
-    """Returns the bounds of the nonlinear gain of a PID, as the firmware proves them; structural modes are left out."""
-    return Popov(*_quadrant.popov(_rigid(plant).numbers(), gains.numbers(), rate_hz))
+    """Returns the bounds of the nonlinear gain of a PID, as the firmware proves them; structural modes are left out. Both are 1 if nothing is
+    proven, as of a loop that is unstable."""
+    return Popov(*_quadrant.popov(_rigid(plant).numbers(), _numbers(gains), rate_hz))
 
 
 @dataclass(frozen=True)
@@ -195,5 +204,5 @@ def npid(
     """Chooses the nonlinear gain: a share of the Popov bound, ``largest`` at most, over the error at which the proportional part equals
     ``breakaway_v``, or over ``range_mm``. None if that leaves no gain above 1."""
     bound = popov(plant, gains, rate_hz=rate_hz).popov
-    found = _quadrant.npid(gains.numbers(), bound, sector_share, breakaway_v, range_mm, largest)
+    found = _quadrant.npid(_numbers(gains), bound, sector_share, breakaway_v, range_mm, largest)
     return None if found is None else Npid(*found)

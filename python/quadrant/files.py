@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Union
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _quadrant
+from . import _quadrant, _values
 from ._result import Result
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ class Recording:
 
     def to_pandas(self) -> pandas.DataFrame:
         """Returns a data frame with a column for each signal, indexed by ``t_s``."""
+        _values.needs("pandas")
         import pandas
 
         frame: pandas.DataFrame = pandas.DataFrame(_signals(self)).set_index("t_s")
@@ -86,8 +87,14 @@ def _signals(source: Result | Recording | Mapping[str, ArrayLike] | pandas.DataF
     return {name: np.asarray(values) for name, values in source.items()}
 
 
-def to_csv(source: Recording, path: Path) -> None:
-    """Writes a recording as the CSV file that the command line and `read` read, every number in full."""
+def to_csv(source: Result | Recording, path: Path) -> None:
+    """Writes a recording as the CSV file that the command line and `read` read, every number in full.
+
+    Of a result of the law these are the reference, the position by the encoder and the output.
+    """
+    if isinstance(source, Result):
+        volts = source.output_v.astype(float)
+        source = Recording(1.0 / source.rate_hz, source.measured_mm, volts, source.reference_mm, np.zeros(len(source)))
     _quadrant.write_recording(
         path, source.sample_time_s, source.reference_mm, source.position_mm, source.voltage_v, source.injection_v
     )
@@ -95,6 +102,7 @@ def to_csv(source: Recording, path: Path) -> None:
 
 def to_parquet(source: Result | Recording | Mapping[str, ArrayLike] | pandas.DataFrame, path: Path) -> None:
     """Writes signals as a Parquet file, a column each; needs pandas and pyarrow."""
+    _values.needs("pandas")
     import pandas
 
     pandas.DataFrame(_signals(source)).to_parquet(path)
@@ -102,6 +110,7 @@ def to_parquet(source: Result | Recording | Mapping[str, ArrayLike] | pandas.Dat
 
 def to_mat(source: Result | Recording | Mapping[str, ArrayLike] | pandas.DataFrame, path: Path) -> None:
     """Writes signals as a MAT file of version 5, a column vector each, for MATLAB; needs SciPy."""
+    _values.needs("scipy")
     from scipy.io import savemat
 
     signals = {name.replace(".", "_").replace("-", "_"): values for name, values in _signals(source).items()}
@@ -110,6 +119,7 @@ def to_mat(source: Result | Recording | Mapping[str, ArrayLike] | pandas.DataFra
 
 def read_mat(path: Path, *, time: str, position: str, voltage: str, reference: str | None = None) -> Recording:
     """Reads a recording from a MAT file by the names of its variables: time in s, evenly spaced, position in mm and voltage in V."""
+    _values.needs("scipy")
     from scipy.io import loadmat
 
     found = loadmat(fspath(path), squeeze_me=True)
@@ -117,12 +127,14 @@ def read_mat(path: Path, *, time: str, position: str, voltage: str, reference: s
     if missing:
         there = ", ".join(sorted(name for name in found if not name.startswith("__")))
         raise KeyError(f"{path} has no variable {missing[0]}; there are {there}")
-    times = np.ascontiguousarray(found[time], dtype=float)
+    times, positions, voltages, references = (
+        _values.vector(name, np.atleast_1d(found[name])) for name in (time, position, voltage, reference or position)
+    )
+    lengths = {name: len(np.atleast_1d(found[name])) for name in (time, position, voltage, reference or position)}
+    if len(set(lengths.values())) > 1 or len(times) < 2:
+        raise ValueError(f"{path}: the variables have {lengths} samples; they must have as many, two or more")
     steps = np.diff(times)
     sample_time_s = float(np.mean(steps))
-    if np.max(np.abs(steps - sample_time_s)) > 1e-3 * sample_time_s:
+    if not np.max(np.abs(steps - sample_time_s)) <= 1e-3 * sample_time_s:
         raise ValueError(f"{path}: steps of {time} are {np.min(steps)} to {np.max(steps)} s; they must be even within a thousandth")
-    positions, voltages, references = (
-        np.ascontiguousarray(found[name], dtype=float) for name in (position, voltage, reference or position)
-    )
     return Recording(sample_time_s, positions, voltages, references, np.zeros(len(times)))

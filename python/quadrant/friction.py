@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _quadrant
+from . import _quadrant, _values
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -74,8 +74,9 @@ class Stribeck:
         return self.positive.side(), (self.negative or self.positive).side()
 
     def force(self, v: ArrayLike, x: ArrayLike | None = None) -> Floats:
-        """Returns the friction at velocities, mm/s, shape (n,); it has no memory, and positions do not count."""
-        return _quadrant.friction_static(*self._sides(), np.atleast_1d(np.asarray(v, dtype=float)))
+        """Returns the friction at velocities, mm/s, in their shape; it has no memory, and positions do not count."""
+        speeds = _values.real("v", v)
+        return _quadrant.friction_static(*self._sides(), speeds.ravel()).reshape(speeds.shape)
 
     def plot(self, axes: Axes | None = None, most_mm_s: float = 20.0, label: str | None = None) -> Axes:
         """Plots the friction over the velocity; returns the axes of matplotlib."""
@@ -85,6 +86,7 @@ class Stribeck:
 
 def _plotted(axes: Axes | None, x: Floats, y: Floats, name: str, label: str | None) -> Axes:
     if axes is None:
+        _values.needs("matplotlib")
         import matplotlib.pyplot as plt
 
         axes = plt.subplots()[1]
@@ -126,8 +128,9 @@ class _WithMemory:
         array of shape (n,)
             The friction, viscous friction included, by the exact step of each branch over a sample.
         """
-        x = np.ascontiguousarray(x, dtype=float)
-        moved = np.diff(x, prepend=x[:1]) / sample_time_s if v is None else np.ascontiguousarray(v, dtype=float)
+        x = _values.vector("x", x)
+        _values.above_zero("sample_time_s", sample_time_s)
+        moved = np.diff(x, prepend=x[:1]) / sample_time_s if v is None else _values.vector("v", v)
         kind, numbers, elements, attraction = self._model()
         return _quadrant.friction_force(
             kind, numbers, *self.sliding._sides(), elements, attraction, moved, x, sample_time_s
@@ -136,6 +139,7 @@ class _WithMemory:
     def loop(self, amplitude_mm: float = 0.02, frequency_hz: float = 0.5, cycles: float = 2.25) -> tuple[Floats, Floats]:
         """Returns positions and friction of a sine from rest: a hysteresis loop."""
         step_s = 1e-4
+        _values.above_zero("frequency_hz", frequency_hz)
         time_s = np.arange(int(cycles / frequency_hz / step_s)) * step_s
         x = amplitude_mm * np.sin(2 * np.pi * frequency_hz * time_s)
         return x, self.force(None, x, step_s)
@@ -169,8 +173,9 @@ class Gms(_WithMemory):
     def virgin_curve(self, displacement_mm: ArrayLike) -> Floats:
         """Returns the friction at displacements from slack springs, at the breakaway level."""
         mean = 0.5 * sum(side[1] for side in self.sliding._sides())
-        places = np.atleast_1d(np.asarray(displacement_mm, dtype=float))
-        return _quadrant.virgin_curve(list(self.elements), self.attraction, mean, places)
+        places = _values.real("displacement_mm", displacement_mm)
+        _, _, elements, attraction = self._model()
+        return _quadrant.virgin_curve(elements, attraction, mean, places.ravel()).reshape(places.shape)
 
 
 @dataclass(frozen=True)
@@ -253,7 +258,7 @@ def fit_hysteresis(
     """
     known = None if sliding is None else sliding._sides()
     found = _quadrant.fit_hysteresis(
-        np.ascontiguousarray(position, dtype=float), np.ascontiguousarray(force, dtype=float), sample_time_s, elements, known
+        _values.vector("position", position), _values.vector("force", force), sample_time_s, elements, known
     )
     level = found["level"]
     plateau = sliding or Stribeck.of(level, level)
@@ -277,9 +282,10 @@ def fit_runs(v: ArrayLike, force: ArrayLike, deviation: ArrayLike | float, *, ex
     exponent : float or None
         Exponent of the Stribeck curve; None fits it.
     """
-    speeds = np.ascontiguousarray(v, dtype=float)
-    deviations = np.ascontiguousarray(np.broadcast_to(np.asarray(deviation, dtype=float), speeds.shape))
-    forces = np.ascontiguousarray(force, dtype=float)
+    speeds, forces = _values.vector("v", v), _values.vector("force", force)
+    deviations = _values.real("deviation", deviation)
+    if deviations.ndim == 0:
+        deviations = np.full(speeds.shape, deviations)
     found = _quadrant.fit_runs(speeds, forces, deviations, exponent)
     parameters = {
         f"{name}, {sense}": (value, error)

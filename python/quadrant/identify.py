@@ -8,28 +8,40 @@ Reference Models of EMPS, 2019.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _quadrant
+from . import _quadrant, _values
 from ._plant import Mode, Plant
+from ._quadrant import Settings, Stage
 from .friction import Curve
+from .machine import Machine
 
 if TYPE_CHECKING:
     import control
     from matplotlib.axes import Axes
 
 Floats = NDArray[np.float64]
+Progress = Callable[[str, float], object]
 
-__all__ = ["Frf", "Mode", "MotionModel", "MotionModels", "MotorConstant", "Plant", "PlantFit", "fit_tf", "frf", "motion", "motor_constant"]
-
-
-def _array(values: ArrayLike) -> Floats:
-    return np.ascontiguousarray(values, dtype=float)
+__all__ = [
+    "Frf",
+    "Mode",
+    "MotionModel",
+    "MotionModels",
+    "MotorConstant",
+    "Plant",
+    "PlantFit",
+    "fit_tf",
+    "frf",
+    "measure_frf",
+    "motion",
+    "motor_constant",
+]
 
 
 @dataclass(frozen=True)
@@ -49,6 +61,7 @@ class Frf:
 
     def to_control(self) -> control.FrequencyResponseData:
         """Returns python-control's ``FrequencyResponseData``, with ``coherence`` and ``relative_deviation`` as attributes."""
+        _values.needs("control")
         import control
 
         found = control.FrequencyResponseData(self.response, 2 * np.pi * self.frequency_hz, smooth=True)
@@ -61,18 +74,32 @@ class Frf:
         """Returns the response of python-control's ``FrequencyResponseData``; without a ``coherence`` every line is trusted."""
         if isinstance(data, cls):
             return data
-        response = np.ascontiguousarray(np.squeeze(data.frdata), dtype=complex)
+        # Its name before python-control 0.10.2 is fresp.
+        values = getattr(data, "frdata", None)
+        values = getattr(data, "fresp", None) if values is None else values
+        if values is None:
+            raise TypeError(
+                f"{type(data).__name__} is no frequency response; control.frd(system, 2 * numpy.pi * frequency_hz) makes one of a system"
+            )
+        response = np.ascontiguousarray(np.squeeze(values), dtype=complex)
+        if response.ndim != 1:
+            raise ValueError(f"the response has the shape {response.shape}: choose one output and one input, such as data[0, 0]")
         lines = np.asarray(data.omega, dtype=float) / (2 * np.pi)
         return cls(
             lines,
             response,
-            _array(getattr(data, "coherence", np.ones(len(lines)))),
-            _array(getattr(data, "relative_deviation", np.full(len(lines), 1e-3))),
+            _values.vector("coherence", getattr(data, "coherence", np.ones(len(lines)))),
+            _values.vector("relative_deviation", getattr(data, "relative_deviation", np.full(len(lines), 1e-3))),
         )
+
+    def _complex(self) -> NDArray[np.complex128]:
+        """Returns the response in double precision."""
+        return np.ascontiguousarray(self.response, dtype=complex)
 
     def plot(self, axes: Sequence[Axes] | None = None, label: str | None = None) -> Sequence[Axes]:
         """Plots gain, phase and coherence over the frequency; returns three axes of matplotlib."""
         if axes is None:
+            _values.needs("matplotlib")
             import matplotlib.pyplot as plt
 
             axes = list(plt.subplots(3, 1, sharex=True)[1])
@@ -119,13 +146,99 @@ def frf(
     """
     low, high = band_hz
     found = _quadrant.frf(
-        _array(position),
-        _array(voltage),
-        1.0 / fs,
+        _values.vector("position", position),
+        _values.vector("voltage", voltage),
+        1.0 / _values.above_zero("fs", fs),
         nperseg,
         (low, min(high, fs)),
-        None if excitation is None else _array(excitation),
+        None if excitation is None else _values.vector("excitation", excitation),
     )
+    return Frf(**found).to_control()
+
+
+def measure_frf(
+    machine: Stage | Machine,
+    axis: str = "x",
+    *,
+    settings: Settings | None = None,
+    velocity_mm_s: float = 37.0,
+    open_loop: bool = False,
+    waveform: str = "multisine",
+    rms_v: float | None = None,
+    band_hz: tuple[float, float] = (4.0, 400.0),
+    rise_hz: float = 200.0,
+    period_s: float = 0.5,
+    averages: int = 40,
+    travel_mm: tuple[float, float] | None = None,
+    seed: int = 1,
+    progress: Progress | None = None,
+) -> control.FrequencyResponseData:
+    """Measures the frequency response of an axis: injects a voltage while the axis slides under its PID alone, or in open loop at rest.
+
+    Parameters
+    ----------
+    machine : Machine or Stage
+        The machine, or a simulated stage.
+    axis : {"x", "y", "z"}
+    settings : Settings, optional
+        Of these the PID moves the axis; by default those in force. A stage needs them.
+    velocity_mm_s : float
+        Velocity meanwhile, mm/s, there and back; 0 measures at standstill, where friction bends the response.
+    open_loop : bool
+        True: the excitation alone drives the amplifier, at standstill.
+    waveform : {"multisine", "random", "sweep"}
+    rms_v : float, optional
+        RMS of the excitation, V; by default 0.3 at standstill, else 0.08 of a multisine and 0.035 of the others.
+    band_hz : (float, float)
+        Lowest and highest frequency, Hz.
+    rise_hz : float
+        Frequency up to which a multisine's amplitudes rise, Hz.
+    period_s : float
+        Period of the excitation, s; its inverse is the resolution.
+    averages : int
+        Blocks that are averaged, 2 or more.
+    travel_mm : (float, float), optional
+        Ways to both ends from where the axis of a machine stands, such as (-200, 200); a homed axis knows it.
+    seed : int
+        Decides phases and, of a stage, the encoder's noise.
+    progress : function of step and share, optional
+        As of `quadrant.commission`.
+
+    Returns
+    -------
+    control.FrequencyResponseData
+        As of `frf`. A machine's outputs are off then, and its settings are as before.
+
+    Raises
+    ------
+    RuntimeError
+        A measurement that was stopped, or that cannot be, with reason and remedy.
+    KeyboardInterrupt
+        At Ctrl-C; the axis stops.
+    """
+    _values.needs("control")
+    slides = velocity_mm_s != 0.0 and not open_loop
+    usual = (0.08 if waveform == "multisine" else 0.035) if slides else 0.3
+    request = (
+        waveform,
+        usual if rms_v is None else rms_v,
+        band_hz,
+        rise_hz,
+        period_s,
+        averages,
+        velocity_mm_s if slides else 0.0,
+        open_loop,
+    )
+    if isinstance(machine, Stage):
+        if travel_mm is not None:
+            raise ValueError("travel_mm is of a machine; that of a stage is its own: Stage(travel_mm=(-200, 200))")
+        if settings is None:
+            raise ValueError("settings: a stage has no law of its own; give those of a commissioning, or Settings.simulated()")
+        found = _quadrant.measure_frf_simulated(machine, settings, axis, request, _values.seed(seed), progress)
+    elif isinstance(machine, Machine):
+        found = machine._session.measure_frf(settings, axis, travel_mm, request, _values.seed(seed), progress)
+    else:
+        raise TypeError(f"{machine!r}: give a quadrant.Stage or a quadrant.Machine")
     return Frf(**found).to_control()
 
 
@@ -181,7 +294,7 @@ def fit_tf(
     measured = Frf.of(data)
     found = _quadrant.fit_tf(
         measured.frequency_hz,
-        measured.response,
+        measured._complex(),
         measured.coherence,
         measured.relative_deviation,
         least_coherence,
@@ -230,7 +343,12 @@ def motor_constant(position: ArrayLike, voltage: ArrayLike, fs: float, *, resolu
     resolution_mm : float
         Length of a count of the encoder, mm.
     """
-    return MotorConstant(**_quadrant.motor_constant(_array(position), _array(voltage), 1.0 / fs, resolution_mm))
+    return MotorConstant(**_quadrant.motor_constant(
+            _values.vector("position", position),
+            _values.vector("voltage", voltage),
+            1.0 / _values.above_zero("fs", fs),
+            resolution_mm,
+        ))
 
 
 @dataclass(frozen=True)
@@ -308,11 +426,11 @@ class MotionModels(Sequence[MotionModel]):
 
     def validate(self, position: ArrayLike, force: ArrayLike, sample_time_s: float) -> Floats:
         """Returns the relative error of each model on another motion, on which nothing is fitted, shape (models,)."""
-        return self._fitted.validate(_array(position), _array(force), sample_time_s)
+        return self._fitted.validate(_values.vector("position", position), _values.vector("force", force), sample_time_s)
 
     def replay(self, model: MotionModel, position: ArrayLike, force: ArrayLike, sample_time_s: float) -> Floats:
         """Returns the positions of a model that a motion's force drives in open loop, mm, at 1 kHz at most."""
-        return self._fitted.replay(self._models.index(model), _array(position), _array(force), sample_time_s)
+        return self._fitted.replay(self._models.index(model), _values.vector("position", position), _values.vector("force", force), sample_time_s)
 
 
 def motion(
@@ -348,6 +466,13 @@ def motion(
     """
     return MotionModels(
         _quadrant.fit_motion(
-            _array(position), _array(force), sample_time_s, cutoff_hz, edge_s, row_rate_hz, list(knots_mm), dead_time_s
+            _values.vector("position", position),
+            _values.vector("force", force),
+            sample_time_s,
+            cutoff_hz,
+            edge_s,
+            row_rate_hz,
+            list(knots_mm),
+            dead_time_s,
         )
     )

@@ -2,18 +2,35 @@
 
 from __future__ import annotations
 
+import warnings
+import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from . import _quadrant
+from . import _quadrant, _values
 from ._quadrant import Motion, Settings, Stage
 
 if TYPE_CHECKING:
     import pandas
 
 __all__ = ["Machine"]
+
+
+def _forget(session: _quadrant.Session) -> None:
+    """Disables the outputs of a machine that nobody has closed, when nothing refers to it or the program ends."""
+    try:
+        session.disable()
+    except (OSError, RuntimeError):
+        # It is closed already, or does not answer any more.
+        pass
+    finally:
+        session.close()
+
+
+def _names(channels: str | Sequence[str]) -> list[str]:
+    return [channels] if isinstance(channels, str) else list(channels)
 
 
 class Machine:
@@ -64,7 +81,9 @@ class Machine:
     ) -> None:
         if place == "emulated":
             place = "emulated:target/images/mps2-f32.elf"
-        self._session = _quadrant.Session(place, stage, settings, seed, flash)
+        self._session = _quadrant.Session(place, stage, settings, _values.seed(seed), flash)
+        self._closed = False
+        weakref.finalize(self, _forget, self._session)
 
     def __enter__(self) -> Machine:
         return self
@@ -75,11 +94,17 @@ class Machine:
         self.close()
 
     def close(self) -> None:
-        """Disables the outputs and ends the session. A machine that does not answer any more ends what its host has started by itself."""
+        """Disables the outputs and ends the session; what another thread waits for ends.
+
+        A machine that does not answer any more ends what its host has started by itself: a `RuntimeWarning` says so.
+        """
+        if self._closed:
+            return
+        self._closed = True
         try:
             self._session.disable()
-        except (ConnectionError, RuntimeError):
-            pass
+        except (OSError, RuntimeError) as error:
+            warnings.warn(f"the outputs may still be on: {error}", RuntimeWarning, stacklevel=2)
         finally:
             self._session.close()
 
@@ -172,12 +197,12 @@ class Machine:
         self.disable()
         self._session.load(settings)
 
-    def record(self, channels: Sequence[str], seconds: float, *, decimation: int | None = None) -> pandas.DataFrame:
+    def record(self, channels: str | Sequence[str], seconds: float, *, decimation: int | None = None) -> pandas.DataFrame:
         """Records channels.
 
         Parameters
         ----------
-        channels : sequence of str
+        channels : str or sequence of str
             Such as ``"x.error"``, ``"x.position"``, ``"x.output"``, ``"stage.state"``; eight at most.
         seconds : float
             Time, s.
@@ -190,21 +215,23 @@ class Machine:
             A column for each channel (positions and errors in mm, velocities in mm/s, voltages in V), indexed by ``t_s``, the time in s.
             ``frame.attrs["lost"]`` is the number of samples that were lost on the way.
         """
+        _values.needs("pandas")
         import pandas
 
-        found = self._session.record(list(channels), seconds, decimation)
+        found = self._session.record(_names(channels), seconds, decimation)
         lost = found.pop("lost")
         frame: pandas.DataFrame = pandas.DataFrame(found).set_index("t_s")
         frame.attrs["lost"] = lost
         return frame
 
-    def watch(self, channels: Sequence[str], seconds: float, *, every_s: float = 0.2) -> Iterator[pandas.DataFrame]:
+    def watch(self, channels: str | Sequence[str], seconds: float, *, every_s: float = 0.2) -> Iterator[pandas.DataFrame]:
         """Yields what `record` gives, a piece every ``every_s``, for a time; some samples between two pieces are missing."""
-        for _ in range(max(1, round(seconds / every_s))):
+        for _ in range(round(_values.above_zero("seconds", seconds) / _values.above_zero("every_s", every_s)) or 1):
             yield self.record(channels, every_s)
 
-    def live_plot(self, channels: Sequence[str], seconds: float = 10.0, *, every_s: float = 0.5) -> None:
+    def live_plot(self, channels: str | Sequence[str], seconds: float = 10.0, *, every_s: float = 0.5) -> None:
         """Plots channels while they come, in a notebook or in a window of matplotlib."""
+        _values.needs("matplotlib")
         import matplotlib.pyplot as plt
 
         figure, axes = plt.subplots()
@@ -218,7 +245,7 @@ class Machine:
             handle = show(figure, display_id=True)
         start_s = 0.0
         for piece in self.watch(channels, seconds, every_s=every_s):
-            for color, name in enumerate(channels):
+            for color, name in enumerate(_names(channels)):
                 label = name if start_s == 0.0 else None
                 axes.plot(start_s + piece.index, piece[name], color=f"C{color}", label=label, linewidth=0.8)
             axes.set_xlabel("time, s")
@@ -229,11 +256,6 @@ class Machine:
             else:
                 handle.update(figure)
         plt.close(figure)
-
-    def _commission(
-        self, axis: str, travel_mm: tuple[float, float] | None, trials: bool, progress: Any
-    ) -> dict[str, Any]:
-        return self._session.commission(axis, travel_mm, trials, progress)
 
     def __repr__(self) -> str:
         return f"Machine({self.endpoint!r})"

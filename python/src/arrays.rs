@@ -1,11 +1,14 @@
 //! Arrays of numpy.
 
-use numpy::{AllowTypeChange, PyArrayLike1};
+use num_complex::Complex64;
+use numpy::{AllowTypeChange, PyArrayLike1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 /// Anything that numpy makes a one-dimensional array of floats of.
 pub(crate) type Numbers<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
+/// An array of complex numbers.
+pub(crate) type ComplexNumbers<'py> = PyReadonlyArray1<'py, Complex64>;
 
 /// Its values, all of them finite.
 ///
@@ -14,12 +17,39 @@ pub(crate) type Numbers<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
 pub(crate) fn finite(name: &str, values: &Numbers<'_>) -> PyResult<Vec<f64>> {
     let values = values.as_array().to_vec();
     if let Some(place) = values.iter().position(|value| !value.is_finite()) {
-        return Err(PyValueError::new_err(format!(
-            "{name}[{place}] = {} is not a finite number",
-            values[place]
-        )));
+        return Err(not_finite(name, place, &values[place].to_string()));
     }
     Ok(values)
+}
+
+/// The same of complex numbers.
+///
+/// # Errors
+/// As [`finite`].
+pub(crate) fn finite_complex(name: &str, values: &ComplexNumbers<'_>) -> PyResult<Vec<Complex64>> {
+    let values = values.as_array().to_vec();
+    if let Some(place) = values.iter().position(|value| !value.is_finite()) {
+        return Err(not_finite(name, place, &values[place].to_string()));
+    }
+    Ok(values)
+}
+
+fn not_finite(name: &str, place: usize, value: &str) -> PyErr {
+    PyValueError::new_err(format!("{name}[{place}] = {value} is not a finite number"))
+}
+
+/// Refuses a number that is not above zero.
+///
+/// # Errors
+/// `ValueError`, with name and value.
+pub(crate) fn positive(name: &str, value: f64) -> PyResult<f64> {
+    if value > 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err(PyValueError::new_err(format!(
+            "{name} = {value}: it must be a finite number above zero"
+        )))
+    }
 }
 
 /// Refuses arrays of other lengths than the first.

@@ -102,10 +102,17 @@ impl Axis {
         velocity: Option<f64>,
         acceleration: Option<f64>,
     ) -> PyResult<i16> {
-        if !reference.is_finite() {
-            return Err(PyValueError::new_err(format!(
-                "reference = {reference} is not a finite number"
-            )));
+        for (name, value) in [
+            ("reference", Some(reference)),
+            ("velocity", velocity),
+            ("acceleration", acceleration),
+        ] {
+            if value.is_some_and(|value| !(value as f32).is_finite()) {
+                return Err(PyValueError::new_err(format!(
+                    "{name} = {} is not a finite number of single precision",
+                    value.unwrap_or_default()
+                )));
+            }
         }
         let [last, before] = self.last_mm.unwrap_or([reference; 2]);
         let rate_hz = self.scale.rate_hz;
@@ -177,7 +184,7 @@ impl Axis {
             ("proportional_v", seen.feedback.proportional),
             ("integral_v", seen.feedback.integral),
             ("derivative_v", seen.feedback.derivative),
-            ("friction_v", seen.feedforward.friction()),
+            ("feedforward_v", seen.feedforward.friction()),
             ("inertia_v", seen.feedforward.inertia),
             ("output_v", seen.output),
         ] {

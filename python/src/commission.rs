@@ -4,13 +4,17 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use numpy::IntoPyArray;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use quadrant_law::axes::AxisName;
 use quadrant_settings::{AxisSettings, StageSettings};
+use quadrant_tune::commission::bootstrap::measuring_settings;
 use quadrant_tune::commission::{
     CommissionError, CommissionSettings, Commissioned, Watch, commission,
 };
+use quadrant_tune::identify::excitation::{Excitation, Waveform};
+use quadrant_tune::identify::frf::{FrfMeasurement, FrfSettings, measure};
 use quadrant_tune::record::Recording;
 use quadrant_tune::test_axis::{
     AxisInfo, Experiment, ExperimentError, MachineError, SimulatedTestAxis, TestAxis, Travel,
@@ -109,6 +113,112 @@ pub(crate) fn run(
     let mut axis = Cancellable { axis, cancelled };
     let found = commission(&mut axis, base, request, &mut watch)?;
     Ok((found, watch.pid))
+}
+
+/// Measures the response of an axis under test, under the PID of settings alone.
+pub(crate) fn measure_response(
+    axis: &mut dyn TestAxis,
+    base: &AxisSettings,
+    request: &FrfSettings,
+    (callback, raised): (Option<&Py<PyAny>>, &Mutex<Option<PyErr>>),
+    cancelled: &AtomicBool,
+) -> Result<FrfMeasurement, String> {
+    let mut watch = Progress {
+        callback,
+        cancelled,
+        raised,
+        pid: None,
+    };
+    let mut axis = Cancellable { axis, cancelled };
+    axis.apply(&measuring_settings(base))
+        .map_err(|error| errors::words(&error))?;
+    let measured = measure(&mut axis, request, &mut |share| {
+        watch.progress("frequency response", share);
+    });
+    measured.map_err(|error| errors::words(&error))
+}
+
+/// A measurement of a response in Python: waveform, RMS in V, band in Hz, Hz up to which amplitudes rise, period in s, averages, velocity in
+/// mm/s, and true for an open loop.
+pub(crate) type FrfRequest = (String, f64, (f64, f64), f64, f64, usize, f64, bool);
+
+/// Its settings.
+///
+/// # Errors
+/// `ValueError` for a waveform that there is not.
+pub(crate) fn frf_settings(request: FrfRequest, seed: u64) -> PyResult<FrfSettings> {
+    let (waveform, rms_v, band_hz, rise_hz, period_s, periods, bias_velocity_mm_s, open_loop) =
+        request;
+    let kinds = [Waveform::Multisine, Waveform::Random, Waveform::Sweep];
+    let kind = kinds.into_iter().find(|kind| kind.to_string() == waveform);
+    let kind = kind.ok_or_else(|| {
+        PyValueError::new_err(format!(
+            "waveform = {waveform:?}: it is \"multisine\", \"random\" or \"sweep\""
+        ))
+    })?;
+    Ok(FrfSettings {
+        excitation: Excitation {
+            waveform: kind,
+            rms_v,
+            band_hz,
+            rise_hz,
+            period_s,
+            seed,
+        },
+        periods,
+        bias_velocity_mm_s,
+        open_loop,
+        ..FrfSettings::default()
+    })
+}
+
+/// A measured response as a dictionary.
+pub(crate) fn measured_dict<'py>(
+    py: Python<'py>,
+    measured: Result<FrfMeasurement, String>,
+    raised: Mutex<Option<PyErr>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    if let Ok(Some(error)) = raised.into_inner() {
+        return Err(error);
+    }
+    let estimate = measured.map_err(PyRuntimeError::new_err)?.estimate;
+    let found = response_dict(py, &estimate.response)?;
+    found.set_item("blocks", estimate.blocks)?;
+    Ok(found)
+}
+
+/// Measures the response of an axis of a simulated stage.
+#[pyfunction]
+#[pyo3(signature = (stage, settings, axis, request, seed, progress))]
+pub(crate) fn measure_frf_simulated<'py>(
+    py: Python<'py>,
+    stage: &Stage,
+    settings: &Settings,
+    axis: &str,
+    request: FrfRequest,
+    seed: u64,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let name = axis_name(axis)?;
+    settings.validate_for_law()?;
+    let truth = stage.setup.truth.axes[name as usize].clone();
+    let travel = Travel::of(stage.known[name as usize]);
+    let request = frf_settings(request, seed)?;
+    let of_stage = &settings.file.stage;
+    let raised = Mutex::new(None);
+    let measured = cancellable(py, |cancelled| {
+        let axis = SimulatedTestAxis::under(of_stage, name as usize, truth, seed);
+        let base = &of_stage.axes[name as usize];
+        let calls = (progress.as_ref(), &raised);
+        measure_response(
+            &mut axis.with_travel(travel),
+            base,
+            &request,
+            calls,
+            cancelled,
+        )
+    })?;
+    measured_dict(py, measured, raised)
 }
 
 /// Commissions an axis of a simulated stage, as it is switched on.

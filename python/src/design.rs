@@ -3,23 +3,23 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadrant_law::control::pid::PidGains;
 use quadrant_sim::loop_shape::OpenLoop;
-use quadrant_sim::margins::Margins;
+use quadrant_sim::margins::{MarginError, Margins};
 use quadrant_tune::design::measured::MeasuredResponse;
 use quadrant_tune::design::npid::{NonlinearRule, Range, choose_nonlinear, filtered_proof};
 use quadrant_tune::design::{
     Form, Peaks, Process, best_filter_s, best_pid_within, load_step_error,
 };
 
-use crate::arrays::{Numbers, finite};
+use crate::arrays::{ComplexNumbers, Numbers, finite, finite_complex, positive};
 use crate::errors;
 use crate::identify::{ModeOf, Plant, modes, plant, response};
-use crate::interrupt::cancellable;
+use crate::interrupt::left_behind;
 
 /// Gains: Kp, Ki, Kd, and the filter of the derivative.
 pub(crate) type Gains = (f64, f64, f64, f64);
@@ -65,7 +65,7 @@ impl DesignProcess {
         } else {
             Process::Modelled {
                 plant,
-                modes: modes(of_modes),
+                modes: modes(of_modes)?,
                 filters: Vec::new(),
             }
         }))
@@ -75,14 +75,14 @@ impl DesignProcess {
     #[staticmethod]
     fn measured(
         frequency_hz: Numbers<'_>,
-        values: PyReadonlyArray1<'_, Complex64>,
+        values: ComplexNumbers<'_>,
         coherence: Numbers<'_>,
         least_coherence: f64,
     ) -> PyResult<Self> {
         let frequency_hz = finite("frequency_hz", &frequency_hz)?;
         let coherence = finite("coherence", &coherence)?;
         let deviations = vec![0.0; frequency_hz.len()];
-        let values = values.as_array().to_vec();
+        let values = finite_complex("response", &values)?;
         let response = response(&frequency_hz, &values, &coherence, &deviations)?;
         let response = MeasuredResponse::new(&response, least_coherence).map_err(errors::of)?;
         Ok(Self(Process::Measured {
@@ -146,12 +146,22 @@ pub(crate) fn design_pid<'py>(
         }
     }
     let form = form(rate_hz, computation_delay_s)?;
+    if let Some(filter_s) = filter_s
+        && !(filter_s.is_finite() && filter_s >= 0.0)
+    {
+        return Err(PyValueError::new_err(format!(
+            "derivative_filter_s = {filter_s}: it must be a finite number of zero or more"
+        )));
+    }
     let filter_s = filter_s.unwrap_or_else(|| rate_hz.map_or(0.0, best_filter_s));
     let peaks = Peaks {
         sensitivity: ms,
         complementary: mt,
     };
-    let found = cancellable(py, |_| best_pid_within(&process.0, form, filter_s, peaks))?;
+    let process = process.0.clone();
+    let found = left_behind(py, move |_| {
+        best_pid_within(&process, form, filter_s, peaks)
+    })?;
     let found = found.map_err(errors::of)?;
     Ok((gains_of(&found.gains), margins_dict(py, &found.margins)?))
 }
@@ -181,8 +191,15 @@ pub(crate) fn load_error(
     rate_hz: Option<f64>,
     computation_delay_s: f64,
 ) -> PyResult<f64> {
-    let form = form(rate_hz, computation_delay_s)?;
-    Ok(load_step_error(&process.0, &gains(of)?, form))
+    let (gains, form) = (gains(of)?, form(rate_hz, computation_delay_s)?);
+    if process.0.margins(&gains, form) == Err(MarginError::Unstable) {
+        return Err(errors::value(MarginError::Unstable));
+    }
+    if gains.ki_v_per_mm_s == 0.0 {
+        // The error does not go back to zero.
+        return Ok(f64::INFINITY);
+    }
+    Ok(load_step_error(&process.0, &gains, form))
 }
 
 /// The open loop at frequencies in Hz.
@@ -211,6 +228,7 @@ pub(crate) fn open_loop<'py>(
 /// The bounds of a nonlinear gain: Popov's, the slope of its line, s, and the circle criterion's.
 #[pyfunction]
 pub(crate) fn popov(of: Plant, of_gains: Gains, rate_hz: f64) -> PyResult<(f64, f64, f64)> {
+    positive("rate_hz", rate_hz)?;
     let proof = filtered_proof(&plant(of)?, &gains(of_gains)?, &[], 1.0 / rate_hz);
     Ok((proof.popov, proof.slope_s, proof.circle))
 }
@@ -228,6 +246,15 @@ pub(crate) fn npid(
     if !(sector_share > 0.0 && sector_share <= 1.0) {
         return Err(PyValueError::new_err(format!(
             "sector_share = {sector_share}: it must be above 0 and at most 1"
+        )));
+    }
+    match breakaway_v {
+        Some(volts) => positive("breakaway_v", volts)?,
+        None => positive("range_mm", range_mm)?,
+    };
+    if largest.is_nan() || largest <= 1.0 {
+        return Err(PyValueError::new_err(format!(
+            "largest = {largest}: it must be above 1"
         )));
     }
     let rule = NonlinearRule {

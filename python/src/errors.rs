@@ -2,6 +2,8 @@
 
 use std::error::Error;
 use std::fmt::Display;
+use std::io;
+use std::path::Path;
 
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
@@ -37,14 +39,27 @@ pub(crate) fn of(error: impl Error + 'static) -> PyErr {
     let text = words(&error);
     let mut source: Option<&(dyn Error + 'static)> = Some(&error);
     while let Some(cause) = source {
-        if cause.is::<std::io::Error>()
-            || matches!(cause.downcast_ref(), Some(TomlFileError::Io { .. }))
-        {
-            return PyOSError::new_err(text);
+        if let Some(TomlFileError::Io { path, source }) = cause.downcast_ref() {
+            return file(path, source);
+        }
+        if let Some(reason) = cause.downcast_ref::<io::Error>() {
+            return os_error(reason, text);
         }
         source = cause.source();
     }
     PyValueError::new_err(text)
+}
+
+/// The `OSError` of a file, of the subclass that its reason has, such as `FileNotFoundError`.
+pub(crate) fn file(path: &Path, reason: &io::Error) -> PyErr {
+    os_error(reason, format!("{}: {reason}", path.display()))
+}
+
+fn os_error(reason: &io::Error, text: String) -> PyErr {
+    match reason.raw_os_error() {
+        Some(number) => PyOSError::new_err((number, text)),
+        None => PyOSError::new_err(text),
+    }
 }
 
 /// An exception of the package by its class.

@@ -15,9 +15,9 @@ use quadrant_tune::identify::single_state::{fit_dahl, fit_lugre};
 use quadrant_tune::identify::static_friction::{Exponent, FrictionMap, FrictionRun, fit_map};
 use quadrant_tune::identify::virgin_curve::{Knots, identify};
 
-use crate::arrays::{Numbers, finite, same_length};
+use crate::arrays::{self, Numbers, finite, same_length};
 use crate::errors;
-use crate::interrupt::cancellable;
+use crate::interrupt::left_behind;
 use crate::records::recording;
 
 /// A Stribeck curve with viscous friction: coulomb, breakaway, Stribeck velocity, exponent, viscous.
@@ -81,7 +81,7 @@ pub(crate) fn gms(elements: &[(f64, f64)], attraction: f64) -> PyResult<GmsParam
     }
     if !elements
         .iter()
-        .all(|&(stiffness, weight)| stiffness > 0.0 && weight >= 0.0)
+        .all(|&(stiffness, weight)| stiffness > 0.0 && stiffness.is_finite() && weight >= 0.0)
         || (sum - 1.0).abs() > 1e-6
     {
         return Err(PyValueError::new_err(format!(
@@ -143,32 +143,29 @@ pub(crate) fn friction_force<'py>(
     step_s: f64,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let friction = sides(positive, negative)?;
-    if !(step_s.is_finite() && step_s > 0.0) {
-        return Err(PyValueError::new_err(format!(
-            "sample_time_s = {step_s}: it must be above zero"
-        )));
-    }
-    let numbers = |count: usize| -> PyResult<&[f64]> {
-        if numbers.len() == count && numbers.iter().all(|n| n.is_finite() && *n >= 0.0) {
-            Ok(&numbers)
-        } else {
-            Err(PyValueError::new_err(format!(
-                "{numbers:?}: {count} numbers of zero or more are needed"
-            )))
+    arrays::positive("sample_time_s", step_s)?;
+    let number = |index: usize, name: &str, (least, most): (f64, f64)| -> PyResult<f64> {
+        match numbers.get(index) {
+            Some(&number) if (least..=most).contains(&number) => Ok(number),
+            found => Err(PyValueError::new_err(format!(
+                "{name} = {}: it is {least} to {most}",
+                found.copied().unwrap_or(f64::NAN)
+            ))),
         }
     };
+    let stiffness = || number(0, "stiffness", (f64::MIN_POSITIVE, f64::MAX));
     let model = match kind {
         "gms" => FrictionParameters::Gms,
         "smoothed" => FrictionParameters::Smoothed(SmoothedGmsParameters {
-            width: numbers(1)?[0],
+            width: number(0, "width", (1e-3, 1.0))?,
         }),
         "dahl" => FrictionParameters::Dahl(DahlParameters {
-            stiffness_v_per_mm: numbers(2)?[0],
-            exponent: numbers(2)?[1],
+            stiffness_v_per_mm: stiffness()?,
+            exponent: number(1, "exponent", (1.0, 3.0))?,
         }),
         "lugre" => FrictionParameters::Lugre(LugreParameters {
-            stiffness_v_per_mm: numbers(2)?[0],
-            damping_v_s_per_mm: numbers(2)?[1],
+            stiffness_v_per_mm: stiffness()?,
+            damping_v_s_per_mm: number(1, "damping", (0.0, f64::MAX))?,
         }),
         other => return Err(PyValueError::new_err(format!("no friction model {other}"))),
     };
@@ -181,7 +178,7 @@ pub(crate) fn friction_force<'py>(
     };
     let (velocity, position) = (finite("v", &velocity)?, finite("x", &position)?);
     same_length(("v", velocity.len()), &[("x", position.len())])?;
-    let force = py.detach(|| {
+    let force = left_behind(py, move |_| {
         let mut presliding = Presliding::new(&axis, step_s);
         let mut last = position.first().copied().unwrap_or(0.0);
         let samples = velocity.iter().zip(&position);
@@ -193,7 +190,7 @@ pub(crate) fn friction_force<'py>(
                 force + side.viscous_v_s_per_mm * v
             })
             .collect::<Vec<f64>>()
-    });
+    })?;
     Ok(force.into_pyarray(py))
 }
 
@@ -250,7 +247,18 @@ pub(crate) fn fit_hysteresis<'py>(
     let recording = recording(&position, &force, sample_time_s)?;
     let known = sliding.map(|(positive, negative)| sides(positive, negative));
     let known = known.transpose()?;
-    let fitted = cancellable(py, |_| {
+    // Friction takes energy out of every motion.
+    let steps = recording.position_mm.windows(2);
+    let work: f64 = steps
+        .zip(recording.voltage_v.windows(2))
+        .map(|(mm, force)| (mm[1] - mm[0]) * (force[0] + force[1]))
+        .sum();
+    if work <= 0.0 && recording.len() > 1 {
+        return Err(PyValueError::new_err(
+            "the force does no work against friction: is it zero, or are the signs of position and force not alike?",
+        ));
+    }
+    let fitted = left_behind(py, move |_| {
         identify(&recording, known.as_ref(), &Knots::Automatic(elements))
     })?;
     let fitted = fitted.map_err(errors::of)?;
@@ -292,6 +300,15 @@ pub(crate) fn fit_runs<'py>(
         ("v", velocity.len()),
         &[("force", force.len()), ("deviation", deviation.len())],
     )?;
+    if let Some(place) = deviation.iter().position(|value| *value <= 0.0) {
+        return Err(PyValueError::new_err(format!(
+            "deviation[{place}] = {}: it must be above zero",
+            deviation[place]
+        )));
+    }
+    if let Some(exponent) = exponent {
+        arrays::positive("exponent", exponent)?;
+    }
     let mut runs: Vec<FrictionRun> = velocity
         .iter()
         .zip(&force)

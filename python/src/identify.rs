@@ -1,9 +1,11 @@
 //! Identification on recordings: frequency responses, linear models, inertia and friction of a motion.
 
 use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use num_complex::Complex64;
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -19,11 +21,11 @@ use quadrant_tune::identify::plant::{PlantFit, PlantFitSettings, Stiffness, fit_
 use quadrant_tune::identify::response::{FrequencyResponse, ResponsePoint};
 use quadrant_tune::record::Recording;
 
-use crate::arrays::{Numbers, finite, same_length};
+use crate::arrays::{ComplexNumbers, Numbers, finite, finite_complex, positive, same_length};
 use crate::errors;
 use crate::friction::{elements_of, side_of};
-use crate::interrupt::cancellable;
-use crate::records::recording;
+use crate::interrupt::left_behind;
+use crate::records::{named, recording};
 
 /// A linear model: A, B, C, Td.
 pub(crate) type Plant = (f64, f64, f64, f64);
@@ -59,15 +61,29 @@ pub(crate) fn plant(plant: Plant) -> PyResult<PlantModel> {
     )))
 }
 
-pub(crate) fn modes(modes: Vec<ModeOf>) -> Vec<Mode> {
-    let modes = modes.into_iter();
-    modes
-        .map(|(frequency_hz, damping, anti)| Mode {
+/// The modes of tuples.
+///
+/// # Errors
+/// A frequency or a damping ratio that is not above zero.
+pub(crate) fn modes(modes: Vec<ModeOf>) -> PyResult<Vec<Mode>> {
+    let mode = |(frequency_hz, damping, anti): ModeOf| {
+        positive("mode.frequency_hz", frequency_hz)?;
+        positive("mode.damping", damping)?;
+        if let Some((anti_hz, anti_damping)) = anti {
+            positive("mode.anti[0]", anti_hz)?;
+            if !(anti_damping.is_finite() && anti_damping >= 0.0) {
+                return Err(PyValueError::new_err(format!(
+                    "mode.anti[1] = {anti_damping}: it must be a finite number of zero or more"
+                )));
+            }
+        }
+        Ok(Mode {
             frequency_hz,
             damping,
             anti,
         })
-        .collect()
+    };
+    modes.into_iter().map(mode).collect()
 }
 
 /// A measured response of arrays.
@@ -88,6 +104,17 @@ pub(crate) fn response(
             ("relative_deviation", deviation.len()),
         ],
     )?;
+    if let Some(place) = response.iter().position(|value| value.norm_sqr() == 0.0) {
+        return Err(PyValueError::new_err(format!(
+            "response[{place}] = 0: a line that was measured is not zero"
+        )));
+    }
+    if let Some(place) = deviation.iter().position(|value| *value < 0.0) {
+        return Err(PyValueError::new_err(format!(
+            "relative_deviation[{place}] = {}: it must be zero or more",
+            deviation[place]
+        )));
+    }
     if frequency_hz.first().is_some_and(|first| *first <= 0.0)
         || frequency_hz.windows(2).any(|pair| pair[0] >= pair[1])
     {
@@ -143,13 +170,13 @@ pub(crate) fn frf<'py>(
     band_hz: (f64, f64),
     injection: Option<Numbers<'py>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let mut recording = recording(&position, &voltage, sample_time_s)?;
+    let mut recording = named(&position, ("voltage", &voltage), sample_time_s)?;
     let estimator = match injection {
         Some(injection) => {
-            recording.injection_v = finite("injection", &injection)?;
+            recording.injection_v = finite("excitation", &injection)?;
             same_length(
                 ("position", recording.len()),
-                &[("injection", recording.injection_v.len())],
+                &[("excitation", recording.injection_v.len())],
             )?;
             Estimator::Instrument
         }
@@ -171,7 +198,7 @@ pub(crate) fn frf<'py>(
             "band_hz = ({low}, {high}) has no line: lines are {resolution_hz:.4} Hz apart"
         )));
     }
-    let estimated = cancellable(py, |_| {
+    let estimated = left_behind(py, move |_| {
         let blocks: Vec<(&Recording, Range<usize>)> = (0..)
             .map(|index| index * (block / 2))
             .take_while(|first| first + block <= samples)
@@ -179,6 +206,13 @@ pub(crate) fn frf<'py>(
             .collect();
         estimate(&blocks, &lines, estimator)
     })?;
+    let mut points = estimated.response.points.iter();
+    if let Some(point) = points.find(|point| !point.response.is_finite()) {
+        return Err(PyValueError::new_err(format!(
+            "the response at {:.4} Hz is no number: nothing excites the axis there; check voltage and excitation, or limit band_hz",
+            point.frequency_hz
+        )));
+    }
     let found = response_dict(py, &estimated.response)?;
     found.set_item("blocks", estimated.blocks)?;
     Ok(found)
@@ -218,7 +252,7 @@ pub(crate) fn plant_fit_dict<'py>(
 pub(crate) fn fit_tf<'py>(
     py: Python<'py>,
     frequency_hz: Numbers<'py>,
-    values: PyReadonlyArray1<'py, Complex64>,
+    values: ComplexNumbers<'py>,
     coherence: Numbers<'py>,
     deviation: Numbers<'py>,
     least_coherence: f64,
@@ -227,7 +261,7 @@ pub(crate) fn fit_tf<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let measured = response(
         &finite("frequency_hz", &frequency_hz)?,
-        &values.as_array().to_vec(),
+        &finite_complex("response", &values)?,
         &finite("coherence", &coherence)?,
         &finite("relative_deviation", &deviation)?,
     )?;
@@ -241,7 +275,7 @@ pub(crate) fn fit_tf<'py>(
         },
         ..PlantFitSettings::default()
     };
-    let fitted = cancellable(py, |_| fit_plant(&measured, &settings))?;
+    let fitted = left_behind(py, move |_| fit_plant(&measured, &settings))?;
     plant_fit_dict(py, &fitted.map_err(errors::of)?)
 }
 
@@ -254,7 +288,7 @@ pub(crate) fn plant_response<'py>(
     frequency_hz: Numbers<'py>,
 ) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
     use quadrant_settings::response::LinearResponse;
-    let (plant, modes) = (plant(of)?, modes(of_modes));
+    let (plant, modes) = (plant(of)?, modes(of_modes)?);
     let values = finite("frequency_hz", &frequency_hz)?;
     let response: Vec<Complex64> = values
         .iter()
@@ -290,7 +324,8 @@ pub(crate) fn motor_constant<'py>(
     sample_time_s: f64,
     resolution_mm: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let mut recording = recording(&position, &voltage, sample_time_s)?;
+    positive("resolution_mm", resolution_mm)?;
+    let mut recording = named(&position, ("voltage", &voltage), sample_time_s)?;
     recording.injection_v.clone_from(&recording.voltage_v);
     let settings = MotorConstantSettings::of(&recording);
     let evaluated = evaluate(recording, &settings, resolution_mm);
@@ -301,7 +336,7 @@ pub(crate) fn motor_constant<'py>(
 #[pyclass(module = "quadrant", name = "MotionModels", frozen)]
 #[derive(Debug)]
 pub(crate) struct MotionModels {
-    candidates: Vec<Candidate>,
+    candidates: Arc<[Candidate]>,
     settings: MotionFitSettings,
 }
 
@@ -330,9 +365,17 @@ pub(crate) fn fit_motion(
         knots_mm,
         dead_time_s,
     };
-    let fitted = cancellable(py, |_| fit(&recording, &settings, &|_| {}))?;
+    let used = settings.clone();
+    let fitted = left_behind(py, move |cancelled| {
+        fit(&recording, &used, &|_| {
+            if cancelled.load(Ordering::Relaxed) {
+                // Drops what is left of the fit.
+                std::panic::resume_unwind(Box::new(()));
+            }
+        })
+    })?;
     Ok(MotionModels {
-        candidates: fitted.map_err(errors::of)?,
+        candidates: fitted.map_err(errors::of)?.into(),
         settings,
     })
 }
@@ -406,9 +449,8 @@ impl MotionModels {
         sample_time_s: f64,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let recording = recording(&position, &voltage, sample_time_s)?;
-        let found = cancellable(py, |_| {
-            validate(&self.candidates, &recording, &self.settings)
-        })?;
+        let (candidates, settings) = (Arc::clone(&self.candidates), self.settings.clone());
+        let found = left_behind(py, move |_| validate(&candidates, &recording, &settings))?;
         Ok(found.map_err(errors::of)?.into_pyarray(py))
     }
 
@@ -421,11 +463,12 @@ impl MotionModels {
         voltage: Numbers<'py>,
         sample_time_s: f64,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let candidate = self.at(index)?;
+        let model = self.at(index)?.model.clone();
         let recording = recording(&position, &voltage, sample_time_s)?;
-        let replayed = cancellable(py, |_| {
-            let signals = Signals::new(&recording, &self.settings);
-            replay_open_loop(&candidate.model, &recording, &signals)
+        let settings = self.settings.clone();
+        let replayed = left_behind(py, move |_| {
+            let signals = Signals::new(&recording, &settings);
+            replay_open_loop(&model, &recording, &signals)
         })?;
         Ok(replayed.position_mm.into_pyarray(py))
     }

@@ -1,17 +1,23 @@
 //! Values between Python, JSON and TOML, by the module `json` of Python.
 
 use pyo3::prelude::*;
-use pyo3::types::PyString;
+use pyo3::types::{PyDict, PyString};
 
 use crate::errors;
 
-/// JSON of an object of Python.
+/// JSON of an object of Python; scalars and arrays of numpy are numbers and lists.
 ///
 /// # Errors
-/// `TypeError` for an object that JSON has no form of.
+/// `TypeError` for an object that JSON has no form of, `ValueError` for a number that is not finite.
 pub(crate) fn dump(object: &Bound<'_, PyAny>) -> PyResult<String> {
-    let json = object.py().import("json")?;
-    json.getattr("dumps")?.call1((object,))?.extract()
+    let py = object.py();
+    let options = PyDict::new(py);
+    options.set_item("default", py.import("quadrant._values")?.getattr("plain")?)?;
+    options.set_item("allow_nan", false)?;
+    let json = py.import("json")?;
+    json.getattr("dumps")?
+        .call((object,), Some(&options))?
+        .extract()
 }
 
 /// The object of Python that JSON says.

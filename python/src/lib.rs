@@ -35,6 +35,7 @@ fn quadrant(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<identify::MotionModels>()?;
     module.add_class::<machine::Session>()?;
     module.add_function(wrap_pyfunction!(commission::commission_simulated, module)?)?;
+    module.add_function(wrap_pyfunction!(commission::measure_frf_simulated, module)?)?;
     module.add_function(wrap_pyfunction!(design::design_pid, module)?)?;
     module.add_function(wrap_pyfunction!(design::margins, module)?)?;
     module.add_function(wrap_pyfunction!(design::load_error, module)?)?;

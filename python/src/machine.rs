@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 use std::sync::Mutex;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::thread;
-use std::time::Duration;
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
 
 use numpy::IntoPyArray;
 use pyo3::exceptions::{
@@ -25,11 +25,12 @@ use quadrant_link::message::{
     AxisName as LinkAxis, AxisSet, Body, Channel, Harmonic, Motion as LinkMotion, Plan,
     PointToPoint, Status,
 };
+use quadrant_settings::StageSettings;
 use quadrant_sim::stage_setup::StageSetup;
 use quadrant_tune::commission::CommissionSettings;
-use quadrant_tune::test_axis::Travel;
+use quadrant_tune::test_axis::{TestAxis, Travel};
 
-use crate::commission;
+use crate::commission::{self, FrfRequest};
 use crate::references::Motion;
 use crate::settings::{Settings, axis_name};
 use crate::stage::Stage;
@@ -40,7 +41,9 @@ type Job = Box<dyn FnOnce(&mut Client) + Send>;
 
 /// Time between two looks for signals, and at the machine while nothing is asked of it.
 const LOOK: Duration = Duration::from_millis(50);
-/// Longest time for which an interrupted request is waited for.
+/// Time between two looks whether a session has ended.
+const CLOSING: Duration = Duration::from_millis(1);
+/// Longest time for which an interrupted request, or the end of a session, is waited for.
 const GIVE_UP: Duration = Duration::from_secs(5);
 
 /// Place at which a machine is reached.
@@ -91,6 +94,11 @@ pub(crate) struct Session {
     jobs: Mutex<Option<Sender<Job>>>,
     interrupt: Interrupt,
     endpoint: String,
+    /// Requests that have no answer yet.
+    asked: AtomicUsize,
+    /// The process that opened it, and its thread there.
+    process: u32,
+    thread: JoinHandle<()>,
 }
 
 /// The exception of an error of a session.
@@ -143,6 +151,22 @@ fn serve(mut client: Client, jobs: &Receiver<Job>) {
     }
 }
 
+/// Waits for an answer, and looks for signals meanwhile; at an interrupt `give_up` is done. Nothing if there will be none.
+fn answered<T>(answers: &Receiver<T>, give_up: impl FnOnce()) -> PyResult<Option<T>> {
+    loop {
+        match answers.recv_timeout(LOOK) {
+            Ok(answer) => return Ok(Some(answer)),
+            Err(RecvTimeoutError::Timeout) => {
+                if let Err(error) = Python::attach(|py| py.check_signals()) {
+                    give_up();
+                    return Err(error);
+                }
+            }
+            Err(RecvTimeoutError::Disconnected) => return Ok(None),
+        }
+    }
+}
+
 impl Session {
     /// Has the session's thread do something; an interrupt stops the axes.
     fn ask<T: Send + 'static>(
@@ -150,6 +174,16 @@ impl Session {
         py: Python<'_>,
         work: impl FnOnce(&mut Client) -> T + Send + 'static,
     ) -> PyResult<T> {
+        if thread::current().id() == self.thread.thread().id() {
+            return Err(PyRuntimeError::new_err(
+                "the machine is busy with what calls this function, such as a commissioning its progress",
+            ));
+        }
+        if self.is_of_another_process() {
+            return Err(PyConnectionError::new_err(
+                "the machine was opened by another process: open it in this one",
+            ));
+        }
         let (answer, answers) = channel();
         let job: Job = Box::new(move |client| {
             // Nobody waits for it after an interrupt.
@@ -164,26 +198,41 @@ impl Session {
             return Err(closed());
         }
         let interrupt = self.interrupt.clone();
-        py.detach(move || {
-            loop {
-                match answers.recv_timeout(LOOK) {
-                    Ok(answer) => return Ok(answer),
-                    Err(RecvTimeoutError::Timeout) => {
-                        if let Err(error) = Python::attach(|py| py.check_signals()) {
-                            interrupt.request();
-                            let _ = answers.recv_timeout(GIVE_UP);
-                            return Err(error);
-                        }
-                    }
-                    Err(RecvTimeoutError::Disconnected) => return Err(closed()),
-                }
-            }
-        })
+        self.asked.fetch_add(1, Ordering::Relaxed);
+        let answer = py.detach(move || {
+            answered(&answers, || {
+                interrupt.request();
+                let _ = answers.recv_timeout(GIVE_UP);
+            })
+        });
+        self.asked.fetch_sub(1, Ordering::Relaxed);
+        answer?.ok_or_else(closed)
     }
 
     fn order(&self, py: Python<'_>, body: Body) -> PyResult<()> {
         self.ask(py, move |client| client.order(body))?
             .map_err(client_error)
+    }
+
+    /// True in a process that was forked: the session's thread is not in it.
+    fn is_of_another_process(&self) -> bool {
+        std::process::id() != self.process
+    }
+
+    /// An order that does not wait for what another thread has asked for: that ends.
+    fn order_at_once(&self, py: Python<'_>, body: Body) -> PyResult<()> {
+        if self.asked.load(Ordering::Relaxed) > 0 {
+            self.interrupt.request();
+        }
+        let again = body.clone();
+        let order = move |client: &mut Client| match client.order(body) {
+            Err(ClientError::Interrupted { .. }) => {
+                client.resume();
+                client.order(again)
+            }
+            outcome => outcome,
+        };
+        self.ask(py, order)?.map_err(client_error)
     }
 }
 
@@ -227,6 +276,55 @@ fn duration(name: &str, seconds: f64) -> PyResult<Duration> {
     Duration::try_from_secs_f64(seconds).map_err(|_| {
         PyValueError::new_err(format!("{name} = {seconds}: a time of zero or more, s"))
     })
+}
+
+/// Refuses a travel that is none.
+fn check_travel(travel_mm: Option<(f64, f64)>) -> PyResult<()> {
+    match travel_mm {
+        Some((negative, positive))
+            if !(negative <= 0.0 && positive >= 0.0 && negative < positive) =>
+        {
+            Err(PyValueError::new_err(format!(
+                "travel_mm = ({negative}, {positive}): the ways to both ends from where the axis stands, such as (-200, 200)"
+            )))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What was done on an axis, the settings that the machine had before, and the reason if it has not taken them back.
+type Done<T> = (T, StageSettings, Result<(), String>);
+
+/// Does something on an axis under test, then switches the outputs off and puts the settings back that the machine had.
+fn on_axis<T>(
+    client: &mut Client,
+    name: AxisName,
+    travel_mm: Option<(f64, f64)>,
+    work: impl FnOnce(&mut dyn TestAxis, &StageSettings) -> T,
+) -> Result<Done<T>, String> {
+    let before = Measured::settings(client).map_err(|error| errors::words(&error))?;
+    let known = Measured::free_travel(client, name).map_err(|error| errors::words(&error))?;
+    let travel = match travel_mm {
+        Some((negative, positive)) => Travel::between([negative, positive]),
+        None if client.simulated_io().is_some() => known.unwrap_or(Travel::BUILT_IN),
+        None => known.ok_or_else(|| {
+            "the travel is not known: home the axis, or give travel_mm".to_owned()
+        })?,
+    };
+    let outcome = {
+        let mut axis =
+            Measured::test_axis(client, name, travel).map_err(|error| errors::words(&error))?;
+        work(axis.as_mut(), &before)
+    };
+    // An interrupt has ended the work, not the session.
+    client.resume();
+    let restored = Measured::load(client, &before).map_err(|error| {
+        format!(
+            "the machine did not take its old settings back: {}",
+            errors::words(&error)
+        )
+    });
+    Ok((outcome, before, restored))
 }
 
 fn status_dict<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyDict>> {
@@ -312,7 +410,7 @@ impl Session {
         let (jobs, received) = channel();
         let (opened, opening) = channel();
         // Transports stay on the thread that opened them.
-        thread::spawn(move || match place.open() {
+        let session = thread::spawn(move || match place.open() {
             Ok(client) => {
                 let _ = opened.send(Ok((client.interrupt(), client.endpoint())));
                 serve(client, &received);
@@ -321,14 +419,18 @@ impl Session {
                 let _ = opened.send(Err(reason));
             }
         });
-        let opened = py.detach(move || opening.recv());
+        // After an interrupt it opens, has no jobs, and closes.
+        let opened = py.detach(move || answered(&opening, || {}))?;
         let (interrupt, endpoint) = opened
-            .map_err(|_| PyConnectionError::new_err("the session has ended before it began"))?
+            .ok_or_else(|| PyConnectionError::new_err("the session has ended before it began"))?
             .map_err(PyConnectionError::new_err)?;
         Ok(Self {
             jobs: Mutex::new(Some(jobs)),
             interrupt,
             endpoint,
+            asked: AtomicUsize::new(0),
+            process: std::process::id(),
+            thread: session,
         })
     }
 
@@ -358,11 +460,11 @@ impl Session {
     }
 
     fn disable(&self, py: Python<'_>) -> PyResult<()> {
-        self.order(py, Body::Disable)
+        self.order_at_once(py, Body::Disable)
     }
 
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
-        self.order(py, Body::Stop)
+        self.order_at_once(py, Body::Stop)
     }
 
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
@@ -551,48 +653,74 @@ impl Session {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let name = axis_name(axis)?;
-        if let Some((negative, positive)) = travel_mm
-            && !(negative <= 0.0 && positive >= 0.0 && negative < positive)
-        {
-            return Err(PyValueError::new_err(format!(
-                "travel_mm = ({negative}, {positive}): the ways to both ends from where the axis stands, such as (-200, 200)"
-            )));
-        }
+        check_travel(travel_mm)?;
         let request = CommissionSettings {
             trials,
             ..CommissionSettings::default()
         };
-        let (outcome, stage, raised) = self
-            .ask(py, move |client| {
-                let stage = Measured::settings(client).map_err(|error| errors::words(&error))?;
-                let known =
-                    Measured::free_travel(client, name).map_err(|error| errors::words(&error))?;
-                let travel = match travel_mm {
-                    Some((negative, positive)) => Travel::between([negative, positive]),
-                    None if client.simulated_io().is_some() => known.unwrap_or(Travel::BUILT_IN),
-                    None => known.ok_or_else(|| {
-                        "the travel is not known: home the axis, or give travel_mm".to_owned()
-                    })?,
-                };
-                let raised = Mutex::new(None);
-                let cancelled = AtomicBool::new(false);
-                let outcome = {
-                    let mut axis = Measured::test_axis(client, name, travel)
-                        .map_err(|error| errors::words(&error))?;
-                    let base = &stage.axes[name as usize];
-                    let calls = (progress.as_ref(), &raised);
-                    commission::run(axis.as_mut(), base, &request, calls, &cancelled)
-                };
-                Ok((outcome, stage, raised))
-            })?
-            .map_err(|reason: String| PyRuntimeError::new_err(reason))?;
-        commission::result(py, outcome, raised, &stage, name)
+        let raised = Mutex::new(None);
+        let (done, raised) = self.ask(py, move |client| {
+            let done = on_axis(client, name, travel_mm, |axis, stage| {
+                let base = &stage.axes[name as usize];
+                let calls = (progress.as_ref(), &raised);
+                commission::run(axis, base, &request, calls, &AtomicBool::new(false))
+            });
+            (done, raised)
+        })?;
+        let (outcome, stage, restored) = done.map_err(PyRuntimeError::new_err)?;
+        let found = commission::result(py, outcome, raised, &stage, name)?;
+        restored.map_err(PyRuntimeError::new_err)?;
+        Ok(found)
     }
 
-    /// Ends the session.
-    fn close(&self) {
+    /// Measures the response of an axis.
+    #[pyo3(signature = (settings, axis, travel_mm, request, seed, progress))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "a function of the extension, wrapped in Python"
+    )]
+    fn measure_frf<'py>(
+        &self,
+        py: Python<'py>,
+        settings: Option<&Settings>,
+        axis: &str,
+        travel_mm: Option<(f64, f64)>,
+        request: FrfRequest,
+        seed: u64,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let name = axis_name(axis)?;
+        check_travel(travel_mm)?;
+        let request = commission::frf_settings(request, seed)?;
+        let own = settings.map(|settings| settings.file.stage.axes[name as usize].clone());
+        let raised = Mutex::new(None);
+        let (done, raised) = self.ask(py, move |client| {
+            let done = on_axis(client, name, travel_mm, |axis, stage| {
+                let base = own.as_ref().unwrap_or(&stage.axes[name as usize]);
+                let calls = (progress.as_ref(), &raised);
+                commission::measure_response(axis, base, &request, calls, &AtomicBool::new(false))
+            });
+            (done, raised)
+        })?;
+        let (measured, _, restored) = done.map_err(PyRuntimeError::new_err)?;
+        let found = commission::measured_dict(py, measured, raised)?;
+        restored.map_err(PyRuntimeError::new_err)?;
+        Ok(found)
+    }
+
+    /// Ends the session, and waits until its port is free.
+    fn close(&self, py: Python<'_>) {
         if let Ok(mut jobs) = self.jobs.lock() {
             jobs.take();
         }
+        if thread::current().id() == self.thread.thread().id() || self.is_of_another_process() {
+            return;
+        }
+        py.detach(|| {
+            let since = Instant::now();
+            while !self.thread.is_finished() && since.elapsed() < GIVE_UP {
+                thread::sleep(CLOSING);
+            }
+        });
     }
 }

@@ -3,33 +3,35 @@
 use std::path::{Path, PathBuf};
 
 use numpy::IntoPyArray;
-use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use quadrant_tune::record::{ColumnNames, MotionOptions, RecordError, Recording};
+use quadrant_tune::record::{ColumnNames, MotionOptions, Recording};
 
-use crate::arrays::{Numbers, finite, same_length};
+use crate::arrays::{Numbers, finite, positive, same_length};
 use crate::errors;
 
-/// A recording of positions and voltages.
+/// A recording of positions and forces.
 ///
 /// # Errors
 /// Values that are not finite or not equally many, or a sample time that is none.
 pub(crate) fn recording(
     position: &Numbers<'_>,
-    voltage: &Numbers<'_>,
+    force: &Numbers<'_>,
     sample_time_s: f64,
 ) -> PyResult<Recording> {
-    if !(sample_time_s.is_finite() && sample_time_s > 0.0) {
-        return Err(PyValueError::new_err(format!(
-            "sample_time_s = {sample_time_s}: it must be above zero"
-        )));
-    }
-    let (position_mm, voltage_v) = (finite("position", position)?, finite("force", voltage)?);
-    same_length(
-        ("position", position_mm.len()),
-        &[("force", voltage_v.len())],
-    )?;
+    named(position, ("force", force), sample_time_s)
+}
+
+/// The same, with the name of the second signal.
+pub(crate) fn named(
+    position: &Numbers<'_>,
+    (name, voltage): (&str, &Numbers<'_>),
+    sample_time_s: f64,
+) -> PyResult<Recording> {
+    positive("sample_time_s", sample_time_s)?;
+    let (position_mm, voltage_v) = (finite("position", position)?, finite(name, voltage)?);
+    same_length(("position", position_mm.len()), &[(name, voltage_v.len())])?;
     Ok(Recording {
         sample_time_s,
         reference_mm: position_mm.clone(),
@@ -38,13 +40,6 @@ pub(crate) fn recording(
         voltage_v,
         parts: Vec::new(),
     })
-}
-
-fn record_error(error: RecordError) -> PyErr {
-    match error {
-        RecordError::Read { .. } => PyOSError::new_err(errors::words(&error)),
-        other => errors::of(other),
-    }
 }
 
 /// A recording of a file: its signals, and what was guessed and done, in sentences. `columns` names columns and their units.
@@ -64,7 +59,7 @@ pub(crate) fn read_recording<'py>(
     };
     let options = MotionOptions { columns, resample };
     let read = py.detach(|| Recording::read_motion(&path, &options, &mut |_| {}));
-    let (recording, notes) = read.map_err(record_error)?;
+    let (recording, notes) = read.map_err(errors::of)?;
     Ok((signals(py, recording)?, notes))
 }
 
@@ -93,7 +88,7 @@ pub(crate) fn write_recording(
     voltage: Numbers<'_>,
     injection: Numbers<'_>,
 ) -> PyResult<()> {
-    let plain = recording(&position, &voltage, sample_time_s)?;
+    let plain = named(&position, ("voltage", &voltage), sample_time_s)?;
     let (reference_mm, injection_v) = (
         finite("reference", &reference)?,
         finite("injection", &injection)?,
@@ -110,7 +105,5 @@ pub(crate) fn write_recording(
         injection_v,
         ..plain
     };
-    whole
-        .write_csv(Path::new(&path))
-        .map_err(|error| PyOSError::new_err(errors::words(&error)))
+    whole.write_csv(Path::new(&path)).map_err(errors::of)
 }

@@ -9,8 +9,9 @@ use quadrant_law::reference::{
 };
 use quadrant_sim::given_run::GivenReference;
 
-use crate::arrays::{Numbers, finite, same_length};
+use crate::arrays::{Numbers, finite, positive, same_length};
 use crate::errors;
+use crate::interrupt::left_behind;
 use crate::settings::{Settings, axis_name};
 
 /// Longest motion, s.
@@ -21,17 +22,6 @@ const MOST_S: f64 = 3600.0;
 #[derive(Debug)]
 pub(crate) struct Motion {
     settings: MotionSettings,
-}
-
-/// A number above zero.
-fn positive(name: &str, value: f64) -> PyResult<f64> {
-    if value > 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(PyValueError::new_err(format!(
-            "{name} = {value}: it must be above zero"
-        )))
-    }
 }
 
 #[pymethods]
@@ -59,6 +49,11 @@ impl Motion {
         lead_s: f64,
         phase_rad: f64,
     ) -> PyResult<Self> {
+        if !phase_rad.is_finite() {
+            return Err(PyValueError::new_err(format!(
+                "phase_rad = {phase_rad}: it must be a finite number"
+            )));
+        }
         let sine = HarmonicSettings::with_velocity(
             positive("amplitude_mm", amplitude_mm)?,
             positive("velocity_mm_s", velocity_mm_s)?,
@@ -105,7 +100,7 @@ impl Motion {
         Bound<'py, PyArray1<f64>>,
     )> {
         let scale = settings.file.stage.motion_scale(axis_name(axis)? as usize);
-        let given = self.given(scale);
+        let given = self.given(py, scale)?;
         let samples = given.samples().iter();
         let mm: Vec<f64> = samples
             .map(|sample| sample.position.to_mm(scale.resolution_mm))
@@ -139,6 +134,10 @@ impl Motion {
         Ok((py.get_type::<Self>().getattr("parse")?, (text,)))
     }
 
+    fn __eq__(&self, other: &Self) -> bool {
+        self.settings == other.settings
+    }
+
     fn __repr__(&self) -> String {
         match &self.settings {
             MotionSettings::Harmonic(sine) => format!(
@@ -165,8 +164,22 @@ impl Motion {
         &self.settings
     }
 
-    fn given(&self, scale: MotionScale) -> GivenReference {
-        GivenReference::of_motion(&self.settings, scale, (MOST_S * scale.rate_hz) as usize)
+    /// Its samples at a control rate.
+    ///
+    /// # Errors
+    /// `ValueError` for a motion that takes too long.
+    fn given(&self, py: Python<'_>, scale: MotionScale) -> PyResult<GivenReference> {
+        let settings = self.settings;
+        let most = (MOST_S * scale.rate_hz) as usize;
+        let given = left_behind(py, move |_| {
+            GivenReference::of_motion(&settings, scale, most)
+        })?;
+        if given.samples().len() == most {
+            return Err(PyValueError::new_err(format!(
+                "the motion takes more than {MOST_S} s: raise its velocity, or shorten it"
+            )));
+        }
+        Ok(given)
     }
 }
 
@@ -183,7 +196,7 @@ pub(crate) struct Given {
 pub(crate) fn given(object: &Bound<'_, PyAny>, scale: MotionScale) -> PyResult<Given> {
     if let Ok(motion) = object.cast::<Motion>() {
         return Ok(Given {
-            reference: motion.get().given(scale),
+            reference: motion.get().given(object.py(), scale)?,
             first_mm: None,
         });
     }

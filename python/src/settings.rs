@@ -138,8 +138,7 @@ impl Settings {
     /// Writes a settings file, which the command line and the firmware read.
     fn write(&self, path: PathBuf) -> PyResult<()> {
         let text = self.file.sparse_text(&path).map_err(errors::of)?;
-        std::fs::write(&path, text)?;
-        Ok(())
+        std::fs::write(&path, text).map_err(|reason| errors::file(&path, &reason))
     }
 
     /// Raises `ValueError` if the firmware would refuse them.
@@ -177,11 +176,61 @@ impl Settings {
 
     fn __setitem__(&mut self, path: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
         let full = expand(path).ok_or_else(|| path_error(path, TreeError::NotFound))?;
-        self.file
-            .stage
-            .set_json(&full, json::dump(value)?.as_bytes())
+        let not_finite =
+            || PyValueError::new_err(format!("{path} = {value}: it must be a finite number"));
+        let json = json::dump(value).map_err(|error| {
+            if error.is_instance_of::<PyValueError>(value.py()) {
+                not_finite()
+            } else {
+                error
+            }
+        })?;
+        let mut stage = self.file.stage.clone();
+        stage
+            .set_json(&full, json.as_bytes())
             .map_err(|error| path_error(path, error))?;
+        // JSON has no form of NaN and infinity, and `null` is read as the former; TOML has both.
+        let text = toml::to_string(&stage).map_err(errors::value)?;
+        if ["= nan", "= inf"].iter().any(|none| text.contains(none)) {
+            return Err(not_finite());
+        }
+        self.file.stage = stage;
         Ok(())
+    }
+
+    /// True if there is a setting of this path.
+    fn __contains__(&self, path: &str) -> bool {
+        let mut bytes = [0; JSON_BYTES];
+        expand(path).is_some_and(|full| self.file.stage.get_json(&full, &mut bytes).is_ok())
+    }
+
+    /// The paths of all settings.
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(self.paths("")?.into_pyobject(py)?.try_iter()?.into_any())
+    }
+
+    fn __len__(&self) -> PyResult<usize> {
+        Ok(self.paths("")?.len())
+    }
+
+    /// Returns the paths of all settings, as a dictionary does.
+    fn keys(&self) -> PyResult<Vec<String>> {
+        self.paths("")
+    }
+
+    /// Returns a setting, or `default` if there is none of this path.
+    #[pyo3(signature = (path, default=None))]
+    fn get<'py>(
+        &self,
+        py: Python<'py>,
+        path: &str,
+        default: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if self.__contains__(path) {
+            self.__getitem__(py, path)
+        } else {
+            Ok(default.unwrap_or_else(|| py.None().into_bound(py)))
+        }
     }
 
     /// Control rate, Hz.

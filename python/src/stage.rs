@@ -107,7 +107,7 @@ impl Stage {
     /// Reads a stage file, TOML with a table for each axis.
     #[classmethod]
     fn read(_class: &Bound<'_, PyType>, path: PathBuf) -> PyResult<Self> {
-        let text = std::fs::read_to_string(&path)?;
+        let text = std::fs::read_to_string(&path).map_err(|reason| errors::file(&path, &reason))?;
         Self::parsed(text, &path)
     }
 
@@ -221,6 +221,7 @@ impl Stage {
 pub(crate) struct SimulatedAxis {
     axis: quadrant_sim::plant::SimulatedAxis,
     rate_hz: f64,
+    resolution_mm: f64,
 }
 
 impl SimulatedAxis {
@@ -228,22 +229,23 @@ impl SimulatedAxis {
         Self {
             axis: quadrant_sim::plant::SimulatedAxis::new(truth.clone(), rate_hz, seed),
             rate_hz,
+            resolution_mm: truth.resolution_mm,
         }
     }
 }
 
 #[pymethods]
 impl SimulatedAxis {
-    /// Reads the counter, which wraps at 32 bits.
-    fn read(&mut self) -> u32 {
-        self.axis.read_counter()
+    /// Reads the encoder's counter, counts; it wraps at 32 bits, from 2147483647 to -2147483648.
+    fn read(&mut self) -> i32 {
+        self.axis.read_counter().cast_signed()
     }
 
     /// One control period with the converter at a word, or with the amplifier off. Returns the encoder's counter after it.
     #[pyo3(signature = (word, enabled=true))]
-    fn step(&mut self, word: i32, enabled: bool) -> u32 {
+    fn step(&mut self, word: i32, enabled: bool) -> i32 {
         self.axis.step(DacCode::saturating(word), enabled);
-        self.axis.read_counter()
+        self.read()
     }
 
     /// True position, mm.
@@ -279,6 +281,12 @@ impl SimulatedAxis {
     #[getter]
     fn rate_hz(&self) -> f64 {
         self.rate_hz
+    }
+
+    /// Length of a count of the encoder, mm.
+    #[getter]
+    fn resolution_mm(&self) -> f64 {
+        self.resolution_mm
     }
 
     fn __repr__(&self) -> String {

@@ -171,3 +171,38 @@ def test_an_exception_of_progress_ends_the_commissioning() -> None:
 
     with pytest.raises(LookupError, match="motor constant"):
         quadrant.commission(quadrant.Stage(), "x", progress=refuse)
+
+
+def test_a_response_is_measured_on_a_stage_and_on_a_machine() -> None:
+    stage = quadrant.Stage(mass_kg=12.0)
+    settings = quadrant.Settings.simulated()
+    seen: list[float] = []
+    found = identify.measure_frf(stage, settings=settings, averages=8, progress=lambda step, share: seen.append(share))
+    fit = identify.fit_tf(found, least_coherence=0.8)
+    truth = stage.truth_of("x")
+    assert fit.plant.gain_mm_per_v_s2 == pytest.approx(truth["gain_mm_per_v_s2"], rel=0.05)
+    assert fit.plant.delay_s == pytest.approx(truth["delay_s"], abs=3e-4) and max(seen) > 0.8
+    with quadrant.Machine("simulated", stage=stage, settings=settings) as machine:
+        before = machine.settings()
+        on_machine = identify.measure_frf(machine, averages=8)
+        assert machine.settings() == before and machine.status()["state"] == "disabled"
+    ratio = np.abs(np.squeeze(on_machine.frdata) / np.squeeze(found.frdata))
+    assert np.median(np.abs(ratio - 1)) < 0.1
+    with pytest.raises(RuntimeError, match="travel"):
+        identify.measure_frf(stage, settings=settings, velocity_mm_s=240.0, period_s=5.0)
+    with pytest.raises(ValueError, match="multisine"):
+        identify.measure_frf(stage, settings=settings, waveform="square")
+    with pytest.raises(ValueError, match="no law of its own"):
+        identify.measure_frf(stage)
+
+
+def test_a_commissioning_that_ends_early_leaves_the_settings_of_the_machine_as_they_were() -> None:
+    def refuse(step: str, share: float) -> None:
+        if step != "motor constant":
+            raise LookupError(step)
+
+    with quadrant.Machine("simulated:commissioned") as machine:
+        before = machine.settings()
+        with pytest.raises(LookupError):
+            quadrant.commission(machine, progress=refuse)
+        assert machine.settings() == before and machine.status()["state"] == "disabled"

@@ -331,6 +331,12 @@ fn records_that_determine_too_little_are_refused_with_what_they_lack() {
         refusal(&short, &settings),
         MotionFitError::TooShort { rows: 90 }
     ));
+    let mut idle = whole.clone();
+    idle.voltage_v.fill(0.0);
+    assert!(matches!(
+        refusal(&idle, &settings),
+        MotionFitError::NoVoltage
+    ));
     // Only the outward part of one slow move.
     let mut one_way = whole.slice(0..20_000);
     for (index, position) in one_way.position_mm.iter_mut().enumerate() {

@@ -13,6 +13,9 @@ pub enum MotionFitError {
         "{rows} rows are left of the record, and a fit takes {LEAST_ROWS}: record longer, raise the row rate, or cut less at the edges"
     )]
     TooShort { rows: usize },
+    /// The voltage is zero throughout.
+    #[error("the voltage is zero throughout: is it the column of the motor's voltage or force?")]
+    NoVoltage,
     /// It moves one way only.
     #[error(
         "only {percent:.1} % of the record moves in one of the directions: friction and offset cannot be separated without motion both \

@@ -209,6 +209,9 @@ fn check(recording: &Recording, settings: &MotionFitSettings) -> Result<(), Moti
     if rows < LEAST_ROWS {
         return Err(MotionFitError::TooShort { rows });
     }
+    if recording.voltage_v.iter().all(|volts| *volts == 0.0) {
+        return Err(MotionFitError::NoVoltage);
+    }
     Ok(())
 }
 
