@@ -1,6 +1,7 @@
 //! Running other programs.
 
 use std::ffi::OsStr;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -65,6 +66,38 @@ pub fn run(command: &mut Command) -> Result<()> {
     run_quietly(command)
 }
 
+/// Runs tests, shows what they print, and names those that failed in the error.
+pub fn run_tests(command: &mut Command) -> Result<()> {
+    println!("$ {}", spell(command));
+    let mut child = command
+        .stdout(Stdio::piped())
+        .spawn()
+        .with_context(|| format!("cannot start `{}`", spell(command)))?;
+    let mut failed = Vec::new();
+    for line in BufReader::new(child.stdout.take().context("the tests' output")?).lines() {
+        let line = line?;
+        println!("{line}");
+        failed.extend(failed_test(&line).map(str::to_owned));
+    }
+    let status = child.wait()?;
+    ensure!(
+        status.success(),
+        "`{}` failed: {status}; tests that failed: {}",
+        spell(command),
+        if failed.is_empty() {
+            "none".to_owned()
+        } else {
+            failed.join(", ")
+        }
+    );
+    Ok(())
+}
+
+/// The name of a test that failed, from a line of the tests' output.
+fn failed_test(line: &str) -> Option<&str> {
+    line.strip_prefix("test ")?.strip_suffix(" ... FAILED")
+}
+
 /// Runs without saying so; anything but success is an error.
 pub fn run_quietly(command: &mut Command) -> Result<()> {
     let status = command
@@ -101,4 +134,17 @@ pub fn output(command: &mut Command) -> Result<String> {
         );
     }
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{command, failed_test, run_tests};
+
+    #[test]
+    fn tests_that_failed_are_named_in_the_error() {
+        let script = "echo 'test a::b ... ok'; echo 'test a::c ... FAILED'; exit 101";
+        let error = run_tests(command("sh").args(["-c", script])).unwrap_err();
+        assert!(error.to_string().ends_with("failed: a::c"), "{error}");
+        assert_eq!(failed_test("test result: FAILED. 1 passed"), None);
+    }
 }

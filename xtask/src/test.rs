@@ -50,6 +50,9 @@ impl Report {
         for (name, seconds, result) in &self.steps {
             let verdict = if result.is_ok() { "passed" } else { "FAILED" };
             println!("{verdict} {seconds:>7.1} s  {name}");
+            if let Err(error) = result {
+                println!("       {error:#}");
+            }
         }
         let failed = self
             .steps
@@ -154,7 +157,7 @@ fn host(report: &mut Report) -> Result<()> {
     report.step("oldest compilers", msrv::run);
     report.step("host tests", || {
         // Setup has installed the browser: the tests that open pages in it must not skip.
-        command::run(
+        command::run_tests(
             cargo()
                 .args(["test", "--workspace", "--no-fail-fast"])
                 .env("QUADRANT_BROWSER_TESTS", "required"),
