@@ -3,15 +3,13 @@
 use std::path::Path;
 
 use anyhow::Result;
-use quadrant_link::message::{AxisName, Body};
 
 use rigless::device::ResetCause;
 
-use crate::ad5754r;
 use crate::bench::Bench;
 use crate::board::ENABLE;
 use crate::report::Report;
-use crate::scenarios::{WATCHDOG_S, driving, row_off};
+use crate::scenarios::{WATCHDOG_S, clear, jogging, resets, row_off};
 
 pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
     let mut bench = Bench::start_with_clock(image, None, 0);
@@ -28,26 +26,10 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
         "low",
         if enabled { "high" } else { "low" },
     );
-    report.equal(
-        "no 8 MHz at the start: /CLR",
-        "low",
-        if ad5754r::lock(&bench.chip).is_clear_released() {
-            "high"
-        } else {
-            "low"
-        },
-    );
+    report.equal("no 8 MHz at the start: /CLR", "low", clear(&bench));
     drop(bench);
 
-    let (mut bench, mut client) = driving(image)?;
-    client.ask(
-        &mut bench,
-        Body::Jog {
-            axis: AxisName::X,
-            velocity_mm_s: 20.0,
-        },
-    )?;
-    bench.run_for(0.1);
+    let (mut bench, _client) = jogging(image, 20.0)?;
     let since = bench.now();
     bench.with(|_, board, now| {
         board.mcu.drive_clocks(now, |rcc, registers, context| {
@@ -64,17 +46,10 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
         since,
         WATCHDOG_S[1],
     );
-    let resets = bench.with(|world, _, _| {
-        world
-            .resets
-            .iter()
-            .map(|reset| format!("{:?}", reset.1))
-            .collect::<Vec<_>>()
-    });
     report.equal(
         "8 MHz lost: reset by",
         format!("{:?}", ResetCause::Model("IWDG")),
-        resets.join(" "),
+        resets(&mut bench),
     );
     bench.ticks();
     bench.run_for(1.0);

@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use anyhow::{Result, ensure};
-use quadrant_link::message::{AxisName, Body};
+use quadrant_link::message::Body;
 
 use crate::ad5754r;
 use crate::bench::Bench;
 use crate::board::ENABLE;
 use crate::link::Client;
 use crate::report::Report;
-use crate::scenarios::{commissioned, driving, row_fault, row_off, runs};
+use crate::scenarios::{clear, commissioned, jogging, row_fault, row_off, runs};
 
 /// From the loss to the disabled amplifiers, s: a difference is found within four ticks (docs/board-nucleo-f446re.md), and a tick's computation.
 const FOUND_S: f64 = 500e-6;
@@ -36,15 +36,7 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
     report.equal("no converter at the start: /CLR", "low", clear(&bench));
     drop(bench);
 
-    let (mut bench, mut client) = driving(image)?;
-    client.ask(
-        &mut bench,
-        Body::Jog {
-            axis: AxisName::X,
-            velocity_mm_s: 20.0,
-        },
-    )?;
-    bench.run_for(0.1);
+    let (mut bench, mut client) = jogging(image, 20.0)?;
     // 15 bytes a tick: within the second frame of the writing.
     ad5754r::lock(&bench.chip).fails_after_bytes = Some(5);
     let since = bench.now();
@@ -81,12 +73,4 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
         bench.with(|_, board, _| board.level(ENABLE)),
     );
     Ok(())
-}
-
-/// The level of /CLR.
-fn clear(bench: &Bench) -> &'static str {
-    match ad5754r::lock(&bench.chip).is_clear_released() {
-        true => "high",
-        false => "low",
-    }
 }

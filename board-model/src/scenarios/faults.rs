@@ -3,15 +3,16 @@
 use std::path::Path;
 
 use anyhow::{Result, ensure};
-use quadrant_link::message::{AxisName, Body};
+use quadrant_link::message::Body;
 use rigless::device::ResetCause;
 use rigless::soc::Width;
 
-use crate::ad5754r;
 use crate::bench::Bench;
 use crate::link::Client;
 use crate::report::Report;
-use crate::scenarios::{NEXT_TICK_S, WATCHDOG_S, driving, row_fault, row_off, runs};
+use crate::scenarios::{
+    NEXT_TICK_S, WATCHDOG_S, clear, jogging, row_fault, row_off, row_started, runs,
+};
 
 /// TIM7_SR, which every control tick writes.
 const TICK_STATUS: u64 = 0x4000_1410;
@@ -26,20 +27,6 @@ const BELOW_STACK: std::ops::Range<u64> = 0x1FFF_8000..0x2000_0000;
 /// Writes NMIPENDSET, bit 31 of ICSR (0xE000ED04), and loops: movw, movt, mov.w, str, b.
 const PEND_NMI: [u32; 4] = [0x5004_F64E, 0x0000_F2CE, 0x4100_F04F, 0xE7FE_6001];
 
-/// A machine that jogs x.
-fn jogging(image: &Path) -> Result<(Bench, Client)> {
-    let (mut bench, mut client) = driving(image)?;
-    client.ask(
-        &mut bench,
-        Body::Jog {
-            axis: AxisName::X,
-            velocity_mm_s: 20.0,
-        },
-    )?;
-    bench.run_for(0.2);
-    Ok((bench, client))
-}
-
 /// Rows of what follows the end of the firmware: outputs, watchdog, the next start.
 fn aftermath(
     bench: &mut Bench,
@@ -50,15 +37,7 @@ fn aftermath(
 ) -> Result<()> {
     bench.run_for(0.002);
     row_off(bench, report, "enable line", since, off_s);
-    report.equal(
-        "/CLR",
-        "low",
-        if ad5754r::lock(&bench.chip).is_clear_released() {
-            "high"
-        } else {
-            "low"
-        },
-    );
+    report.equal("/CLR", "low", clear(bench));
     let fed = bench.with(|world, _, _| world.feeds.0);
     bench.run_for(0.03);
     let reset = bench.with(|world, _, _| world.resets.first().copied());
@@ -83,19 +62,7 @@ fn aftermath(
         "no control tick after the reset; log {:#?}",
         bench.log()
     );
-    let log = bench.log();
-    let says = log
-        .iter()
-        .rev()
-        .find(|line| line.contains("started by"))
-        .cloned()
-        .unwrap_or_default();
-    report.row(
-        "reset cause in the log",
-        "started by watchdog",
-        &says,
-        says.contains("started by watchdog"),
-    );
+    row_started(bench, report, "started by watchdog");
     let mut client = Client::open(bench)?;
     row_fault(bench, &mut client, report, "fault after the reset", fault)?;
     let refused = client.ask(bench, Body::Enable).is_err() || {
@@ -120,7 +87,7 @@ fn aftermath(
 }
 
 pub(super) fn hard_fault(image: &Path, report: &mut Report) -> Result<()> {
-    let (mut bench, _) = jogging(image)?;
+    let (mut bench, _) = jogging(image, 20.0)?;
     let since = bench.now();
     bench.with_session(|_, session, _, _| session.fail_next(TICK_STATUS, TICK_STATUS + 4));
     aftermath(&mut bench, report, since, NEXT_TICK_S, "20 hard-fault")
@@ -149,7 +116,7 @@ fn run_instead(bench: &mut Bench, image: &Path, code: &'static [u32]) -> Result<
 }
 
 pub(super) fn stack_overflow(image: &Path, report: &mut Report) -> Result<()> {
-    let (mut bench, _) = jogging(image)?;
+    let (mut bench, _) = jogging(image, 20.0)?;
     // The model answers where there is no memory; the chip's first store there is a bus error.
     bench.with_session(|_, session, _, _| session.fail_next(BELOW_STACK.start, BELOW_STACK.end));
     let since = run_instead(&mut bench, image, &RECURSION)?;
@@ -171,7 +138,7 @@ pub(super) fn stack_overflow(image: &Path, report: &mut Report) -> Result<()> {
 }
 
 pub(super) fn nmi(image: &Path, report: &mut Report) -> Result<()> {
-    let (mut bench, _) = jogging(image)?;
+    let (mut bench, _) = jogging(image, 20.0)?;
     let since = run_instead(&mut bench, image, &PEND_NMI)?;
     aftermath(
         &mut bench,

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use anyhow::Result;
-use quadrant_link::message::{AxisName, Body};
+use quadrant_link::message::Body;
 
 use crate::bench::Bench;
 use crate::report::Report;
-use crate::scenarios::{driving, row_off};
+use crate::scenarios::{jogging, row_off};
 
 /// From the last byte of `Disable` to the disabled amplifiers, s: that byte, 11 ticks (docs/safety.md), and a tick's computation.
 const DISABLE_S: f64 = 1.3e-3;
@@ -17,15 +17,7 @@ const BYTES_PER_S: f64 = 92_160.0;
 const FLOOD_S: f64 = 0.3;
 
 pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
-    let (mut bench, mut client) = driving(image)?;
-    client.ask(
-        &mut bench,
-        Body::Jog {
-            axis: AxisName::X,
-            velocity_mm_s: 10.0,
-        },
-    )?;
-    bench.run_for(0.1);
+    let (mut bench, mut client) = jogging(image, 10.0)?;
     let before = client.status(&mut bench)?;
     bench.ticks();
     let bytes = (FLOOD_S * BYTES_PER_S) as usize;

@@ -16,9 +16,10 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use anyhow::{Result, anyhow, ensure};
-use quadrant_link::message::{Body, MachineState, Reply};
+use quadrant_link::message::{AxisName, Body, MachineState, Reply};
 use quadrant_settings::StageSettings;
 
+use crate::ad5754r;
 use crate::bench::Bench;
 use crate::link::Client;
 use crate::report::Report;
@@ -161,4 +162,52 @@ fn row_fault(
     });
     report.equal(done, expected.to_owned(), name);
     Ok(())
+}
+
+/// A machine that jogs x.
+fn jogging(image: &Path, velocity_mm_s: f64) -> Result<(Bench, Client)> {
+    let (mut bench, mut client) = driving(image)?;
+    client.ask(
+        &mut bench,
+        Body::Jog {
+            axis: AxisName::X,
+            velocity_mm_s,
+        },
+    )?;
+    bench.run_for(0.1);
+    Ok((bench, client))
+}
+
+/// Causes of the resets so far.
+fn resets(bench: &mut Bench) -> String {
+    let causes = |reset: &(_, _)| format!("{:?}", reset.1);
+    bench.with(move |world, _, _| {
+        world
+            .resets
+            .iter()
+            .map(causes)
+            .collect::<Vec<_>>()
+            .join(" ")
+    })
+}
+
+/// A row for the cause of the last start in the log.
+fn row_started(bench: &mut Bench, report: &mut Report, expected: &str) {
+    let log = bench.log();
+    let says = log.iter().rev().find(|line| line.contains("started by"));
+    let says = says.cloned().unwrap_or_default();
+    report.row(
+        "reset cause in the log",
+        expected,
+        &says,
+        says.contains(expected),
+    );
+}
+
+/// The level of /CLR.
+fn clear(bench: &Bench) -> &'static str {
+    match ad5754r::lock(&bench.chip).is_clear_released() {
+        true => "high",
+        false => "low",
+    }
 }

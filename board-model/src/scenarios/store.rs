@@ -9,7 +9,7 @@ use quadrant_settings::StageSettings;
 use crate::bench::Bench;
 use crate::link::{Client, provenance};
 use crate::report::Report;
-use crate::scenarios::{WATCHDOG_S, commissioned, row_fault, runs, started};
+use crate::scenarios::{WATCHDOG_S, commissioned, resets, row_fault, row_started, runs, started};
 use crate::stage::COUNT_MM;
 
 /// FLASH_CR.
@@ -37,28 +37,9 @@ pub(super) fn reboot(image: &Path, report: &mut Report) -> Result<()> {
     client.store(&mut bench, "a second set")?;
     client.ask(&mut bench, Body::Reboot)?;
     bench.run_for(0.1);
-    let resets = bench.with(|world, _, _| {
-        world
-            .resets
-            .iter()
-            .map(|reset| format!("{:?}", reset.1))
-            .collect::<Vec<_>>()
-    });
-    report.equal("resets by `reboot`", "Core".into(), resets.join(" "));
+    report.equal("resets by `reboot`", "Core".into(), resets(&mut bench));
     ensure!(runs(&mut bench), "no control tick after the reboot");
-    let log = bench.log();
-    let says = log
-        .iter()
-        .rev()
-        .find(|line| line.contains("started by"))
-        .cloned()
-        .unwrap_or_default();
-    report.row(
-        "reset cause in the log",
-        "started by software",
-        &says,
-        says.contains("started by software"),
-    );
+    row_started(&mut bench, report, "started by software");
     client = Client::open(&mut bench)?;
     let (equal, all) = client.count_equal(&mut bench, &changed)?;
     report.equal(
