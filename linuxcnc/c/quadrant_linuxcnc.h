@@ -17,7 +17,7 @@
 // Number on `fault`: the thread's period is not the one that the settings are for.
 #define OTHER_PERIOD 102
 
-// Number on `fault`: the command is no number.
+// Number on `fault`: the command is no number, or faster than 100 m/s.
 #define NO_NUMBER 103
 
 // Most ticks by which a command can be delayed.

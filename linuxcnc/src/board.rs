@@ -9,7 +9,7 @@ use quadrant_law::axis::Commissioning;
 use quadrant_law::command::Command;
 use quadrant_law::encoder::EncoderReading;
 use quadrant_law::motion::MotionMode;
-use quadrant_law::safety::{AxisSwitches, SafetyState, Switches};
+use quadrant_law::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
 use quadrant_law::stage::{Inputs, Outputs};
 
 use crate::reference::{CommandPins, CommandReference, Preview};
@@ -21,8 +21,11 @@ pub const NOT_ENABLED: i32 = 100;
 pub const ENDED: i32 = 101;
 /// Number on `fault`: the thread's period is not the one that the settings are for.
 pub const OTHER_PERIOD: i32 = 102;
-/// Number on `fault`: the command is no number.
+/// Number on `fault`: the command is no number, or faster than 100 m/s.
 pub const NO_NUMBER: i32 = 103;
+
+/// Largest velocity of a command that is one, mm/s.
+const MOST_MM_S: f64 = 1e5;
 
 /// Ticks in which the outputs must have been enabled.
 const ENABLING_TICKS: u32 = 50;
@@ -313,7 +316,9 @@ impl Board {
                 ahead_mm: command_mm - position_mm,
                 velocity_mm_s: seen.velocity_cmd * self.options.unit_mm,
             };
-            if !(command.ahead_mm.is_finite() && command.velocity_mm_s.is_finite()) {
+            // False also for what is no number.
+            let is_motion = command.velocity_mm_s.abs() <= MOST_MM_S;
+            if !(command.ahead_mm.is_finite() && is_motion) {
                 self.fault = NO_NUMBER;
                 continue;
             }
@@ -388,14 +393,14 @@ impl Board {
                 SafetyState::Start | SafetyState::Stopping(_) => {}
             }
             if self.enabling == 0 && !safety.is_enabled() {
-                self.fault = NOT_ENABLED;
+                self.fault = why_not(pins);
             }
         }
         if safety.is_enabled() {
             return self.take_hold();
         }
         if any && self.enabling == 0 && self.fault == 0 {
-            self.fault = NOT_ENABLED;
+            self.fault = why_not(pins);
         }
         None
     }
@@ -410,11 +415,14 @@ impl Board {
                     self.fault = ENDED;
                     return Some(Command::Disable);
                 }
+                // Without a law it would have no voltage, and LinuxCNC would take it for driven.
                 Hold::Released
-                    if joint.was_enabled
-                        && mode == MotionMode::Hold
-                        && axis.commissioning() != Commissioning::Inert =>
+                    if joint.was_enabled && axis.commissioning() == Commissioning::Inert =>
                 {
+                    self.fault = NOT_ENABLED;
+                    return Some(Command::Disable);
+                }
+                Hold::Released if joint.was_enabled && mode == MotionMode::Hold => {
                     joint.hold = Hold::Leads;
                     return Some(Command::StartMove(joint.name));
                 }
@@ -477,5 +485,17 @@ impl Joint {
     fn rescale(&mut self, codes_per_volt: f32) {
         self.codes_per_volt = codes_per_volt;
         self.volts_per_code = 1.0 / f64::from(codes_per_volt);
+    }
+}
+
+/// The number on `fault` of outputs that could not be enabled.
+fn why_not(pins: &QuadrantPins) -> i32 {
+    let amplifier = pins.joints.iter().any(|joint| joint.amp_fault);
+    if pins.estop {
+        FaultCode::EmergencyStop.number().into()
+    } else if amplifier {
+        FaultCode::AmplifierFault.number().into()
+    } else {
+        NOT_ENABLED
     }
 }

@@ -250,6 +250,7 @@ impl Slow {
             eprintln!(
                 "quadrant: a host asks for a restart: unload the component and load it again"
             );
+            self.half.server().go_on();
         }
         if let Some(file) = &mut self.file {
             let kept = file.keep(self.half.flash().bytes());

@@ -5,8 +5,9 @@ use std::time::{Duration, Instant};
 
 use quadrant_law::safety::FaultCode;
 use quadrant_linuxcnc::board::{NO_NUMBER, NOT_ENABLED, OTHER_PERIOD};
+use quadrant_sim::settings_file::defaults_at;
 
-use crate::component::{Component, PERIOD_NS, Parameters};
+use crate::component::{Component, PERIOD_NS, Parameters, RATE_HZ, settings};
 
 /// A component that follows its command.
 fn following(parameters: &Parameters) -> Component {
@@ -170,4 +171,34 @@ fn an_index_that_resets_the_position_moves_nothing() {
             assert!((one - other).abs() < 2e-3, "{one} {other}");
         }
     }
+}
+
+#[test]
+fn a_joint_without_a_law_is_not_enabled_beside_joints_that_have_one() {
+    let mut settings = settings();
+    settings.axes[2] = defaults_at(RATE_HZ).axes[2].clone();
+    let mut component = Component::start(&Parameters {
+        settings: Some(settings),
+        ..Parameters::default()
+    });
+    component.run(20, false);
+    component.run(2_000, true);
+    assert_off(&component, NOT_ENABLED);
+}
+
+#[test]
+fn an_emergency_stop_that_is_pressed_when_the_machine_is_switched_on_is_named() {
+    let mut component = Component::start(&Parameters::default());
+    component.run(20, false);
+    component.pins.estop = true;
+    component.run(2_000, true);
+    assert_off(&component, FaultCode::EmergencyStop.number().into());
+}
+
+#[test]
+fn a_velocity_that_no_machine_has_switches_off() {
+    let mut component = following(&Parameters::default());
+    let position = [component.stage.axes[0].position_fb; 3];
+    component.step_along(true, position, [1e20; 3]);
+    assert_off(&component, NO_NUMBER);
 }

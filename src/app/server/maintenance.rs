@@ -52,6 +52,11 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         true
     }
 
+    /// Goes on where the board cannot restart itself.
+    pub fn go_on(&mut self) {
+        self.reboot = false;
+    }
+
     /// Lets control enable the outputs again, once nothing needs them off.
     pub(super) fn release(&mut self) {
         let unlock = Order::Unlock {
