@@ -2,13 +2,19 @@
 
 use std::io::{ErrorKind, Read, Result, Write};
 use std::net::{TcpListener, TcpStream};
+use std::time::{Duration, Instant};
 
 use quadrant::hal::Serial;
+
+/// Silence after which a client gives way to another one.
+const SILENT: Duration = Duration::from_secs(10);
 
 /// A listening socket, as a port that never waits.
 pub(crate) struct Port {
     listener: Option<TcpListener>,
     client: Option<TcpStream>,
+    /// Time at which the client last sent something.
+    heard: Instant,
 }
 
 impl Port {
@@ -21,15 +27,24 @@ impl Port {
         Ok(Self {
             listener,
             client: None,
+            heard: Instant::now(),
         })
     }
 
-    /// Lets a client in, if there is none; another one is sent away.
+    /// Lets a client in, if there is none, or one that has left or been silent; else it is sent away.
     fn accept(&mut self) {
         let Some(Ok((stream, _))) = self.listener.as_ref().map(TcpListener::accept) else {
             return;
         };
-        if self.client.is_none() && stream.set_nonblocking(true).is_ok() {
+        let stays = self.client.as_ref().is_some_and(|client| {
+            let here = match client.peek(&mut [0]) {
+                Ok(count) => count > 0,
+                Err(error) => error.kind() == ErrorKind::WouldBlock,
+            };
+            here && self.heard.elapsed() < SILENT
+        });
+        if !stays && stream.set_nonblocking(true).is_ok() {
+            self.heard = Instant::now();
             // Small frames go at once; without it they only go later.
             let _ = stream.set_nodelay(true);
             self.client = Some(stream);
@@ -60,7 +75,11 @@ impl Serial for Port {
             return 0;
         };
         let read = client.read(into);
-        self.exchanged(read)
+        let count = self.exchanged(read);
+        if count > 0 {
+            self.heard = Instant::now();
+        }
+        count
     }
 
     fn write(&mut self, bytes: &[u8]) -> usize {
@@ -73,5 +92,56 @@ impl Serial for Port {
         }
         let written = client.write(bytes);
         self.exchanged(written)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Port, SILENT, Serial};
+    use std::io::Write;
+    use std::net::TcpStream;
+    use std::time::{Duration, Instant};
+
+    /// Reads until something comes, for a second.
+    fn read(port: &mut Port) -> Vec<u8> {
+        let mut bytes = [0; 16];
+        for _ in 0..200 {
+            let count = port.read(&mut bytes);
+            if count > 0 {
+                return bytes[..count].to_vec();
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        Vec::new()
+    }
+
+    fn connect(port: &Port, words: &[u8]) -> TcpStream {
+        let address = port.listener.as_ref().unwrap().local_addr().unwrap();
+        let mut client = TcpStream::connect(address).unwrap();
+        client.write_all(words).unwrap();
+        client
+    }
+
+    #[test]
+    fn a_client_is_served_right_after_another_one_has_left() {
+        let mut port = Port::listen(Some("127.0.0.1:0")).unwrap();
+        for words in [b"one", b"two", b"six"] {
+            let client = connect(&port, words);
+            assert_eq!(read(&mut port), words);
+            drop(client);
+        }
+    }
+
+    #[test]
+    fn a_client_that_is_silent_gives_way_to_another_and_one_that_is_not_stays() {
+        let mut port = Port::listen(Some("127.0.0.1:0")).unwrap();
+        let mut first = connect(&port, b"one");
+        assert_eq!(read(&mut port), b"one");
+        let _sent_away = connect(&port, b"two");
+        first.write_all(b"more").unwrap();
+        assert_eq!(read(&mut port), b"more");
+        port.heard = Instant::now() - SILENT;
+        let _second = connect(&port, b"six");
+        assert_eq!(read(&mut port), b"six");
     }
 }
