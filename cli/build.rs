@@ -43,7 +43,7 @@ fn commit() -> Option<String> {
     Some(format!("{commit}{changed}"))
 }
 
-/// What git prints in this package's folder; `None` if it fails or is missing.
+/// Output of git in this package's folder; `None` if it fails or is missing.
 fn git(arguments: &[&str]) -> Option<String> {
     let output = Command::new("git").args(arguments).output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?;

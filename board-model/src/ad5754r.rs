@@ -140,8 +140,8 @@ impl Ad5754r {
 
     /// True if the outputs A, B and C and the reference are on.
     pub fn is_on(&self) -> bool {
-        let wanted = POWER_REFERENCE | 0b111;
-        self.powered && self.power & wanted == wanted
+        let all = POWER_REFERENCE | 0b111;
+        self.powered && self.power & all == all
     }
 
     /// True if `/CLR` is high.

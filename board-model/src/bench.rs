@@ -37,7 +37,7 @@ const PORTS: std::ops::Range<u64> = 0x4002_0000..0x4002_0C00;
 /// Time between two looks at the log, ns.
 const LOG_NS: u64 = 1_000_000;
 
-/// What the scenario asks the model's thread for.
+/// Request of the scenario to the model's thread.
 enum Order {
     Do(Task),
     RunUntil(u64, SyncSender<()>),

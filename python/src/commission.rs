@@ -93,6 +93,24 @@ impl Watch for Progress<'_> {
     }
 }
 
+/// A function of Python for the progress, and its first exception.
+pub(crate) type Call<'a> = (Option<&'a Py<PyAny>>, &'a Mutex<Option<PyErr>>);
+
+/// An axis that can be cancelled, and its progress.
+fn watched<'a>(
+    axis: &'a mut dyn TestAxis,
+    (callback, raised): Call<'a>,
+    cancelled: &'a AtomicBool,
+) -> (Cancellable<'a>, Progress<'a>) {
+    let progress = Progress {
+        callback,
+        cancelled,
+        raised,
+        pid: None,
+    };
+    (Cancellable { axis, cancelled }, progress)
+}
+
 /// Result of a commissioning, and its PID alone.
 pub(crate) type Outcome = Result<(Commissioned, Option<AxisSettings>), CommissionError>;
 
@@ -101,16 +119,10 @@ pub(crate) fn run(
     axis: &mut dyn TestAxis,
     base: &AxisSettings,
     request: &CommissionSettings,
-    (callback, raised): (Option<&Py<PyAny>>, &Mutex<Option<PyErr>>),
+    call: Call<'_>,
     cancelled: &AtomicBool,
 ) -> Outcome {
-    let mut watch = Progress {
-        callback,
-        cancelled,
-        raised,
-        pid: None,
-    };
-    let mut axis = Cancellable { axis, cancelled };
+    let (mut axis, mut watch) = watched(axis, call, cancelled);
     let found = commission(&mut axis, base, request, &mut watch)?;
     Ok((found, watch.pid))
 }
@@ -120,16 +132,10 @@ pub(crate) fn measure_response(
     axis: &mut dyn TestAxis,
     base: &AxisSettings,
     request: &FrfSettings,
-    (callback, raised): (Option<&Py<PyAny>>, &Mutex<Option<PyErr>>),
+    call: Call<'_>,
     cancelled: &AtomicBool,
 ) -> Result<FrfMeasurement, String> {
-    let mut watch = Progress {
-        callback,
-        cancelled,
-        raised,
-        pid: None,
-    };
-    let mut axis = Cancellable { axis, cancelled };
+    let (mut axis, mut watch) = watched(axis, call, cancelled);
     axis.apply(&measuring_settings(base))
         .map_err(|error| errors::words(&error))?;
     let measured = measure(&mut axis, request, &mut |share| {

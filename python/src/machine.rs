@@ -292,7 +292,7 @@ fn check_travel(travel_mm: Option<(f64, f64)>) -> PyResult<()> {
     }
 }
 
-/// What was done on an axis, the settings that the machine had before, and the reason if it has not taken them back.
+/// Outcome of the work on an axis, the settings that the machine had before, and the reason if it has not taken them back.
 type Done<T> = (T, StageSettings, Result<(), String>);
 
 /// Does something on an axis under test, then switches the outputs off and puts the settings back that the machine had.

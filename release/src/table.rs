@@ -19,7 +19,7 @@ struct Made {
     sha256: String,
 }
 
-/// What was made, and what could not be made.
+/// Table of the files that were made, and of the parts that could not be.
 #[derive(Default)]
 pub(crate) struct Table {
     made: Vec<Made>,

@@ -1,6 +1,6 @@
 //! `cargo xtask msrv`: the oldest compiler of each package, `rust-version`, is one that its dependencies allow, and one that compiles it.
 //!
-//! What the standard library lacked then, clippy finds with any compiler (`incompatible_msrv`).
+//! Clippy finds parts of the standard library that came later, with any compiler (`incompatible_msrv`).
 
 use std::collections::{BTreeMap, BTreeSet};
 

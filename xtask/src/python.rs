@@ -23,7 +23,7 @@ const PACKAGES: [&str; 9] = [
     "dask[distributed]",
     MATURIN,
 ];
-/// What builds the wheel.
+/// Program that builds the wheel.
 const MATURIN: &str = "maturin>=1.9,<2";
 
 /// Builds the wheel, installs it, and runs tests, types, examples and notebooks.

@@ -13,7 +13,7 @@ use crate::scenarios::{NEXT_TICK_S, driving, enable, row_fault, row_off};
 
 /// Velocity of the jog, mm/s.
 const VELOCITY: f64 = 20.0;
-/// A controlled stop at most, s: 105 ms of braking with these settings, 200 ticks at rest, 50 ms for them to be told (docs/safety.md).
+/// A controlled stop at most, s: 105 ms of braking with these settings, 200 ticks at rest, 50 ms in reserve (docs/safety.md).
 const STOP_S: f64 = 0.155;
 /// Supply below the lowest threshold of the supply monitor that the board's page names, mV.
 const LOW_MV: u32 = 2840;

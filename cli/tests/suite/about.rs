@@ -1,4 +1,4 @@
-//! What the command says of itself: version, commit, manual pages.
+//! The command's words about itself: version, commit, manual pages.
 
 use std::fs;
 use std::process::Command;

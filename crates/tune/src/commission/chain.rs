@@ -105,7 +105,7 @@ fn guarded(
         },
     ) {
         Ok(found) => found,
-        Err(error) => return velocity_mode::explain(test_axis, base, &motor, error),
+        Err(error) => return Err(velocity_mode::explain(test_axis, base, &motor, error)),
     };
 
     velocity_mode::refuse(&plant.plant, &response)?;

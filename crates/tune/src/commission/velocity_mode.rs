@@ -40,36 +40,32 @@ pub(super) fn refuse(plant: &PlantModel, response: &FrfMeasurement) -> Result<()
 }
 
 /// The error of an axis on which no linear model was found: that of an amplifier in velocity mode where open loop shows one, else `error`.
-///
-/// # Errors
-/// Always.
-pub(super) fn explain<T>(
+pub(super) fn explain(
     test_axis: &mut Guard<'_>,
     base: &AxisSettings,
     motor: &MotorConstant,
     error: CommissionError,
-) -> Result<T, CommissionError> {
-    if error.is_interrupted() {
-        return Err(error);
-    }
+) -> CommissionError {
     let stands_mm = test_axis
         .interrupted()
         .and_then(|stopped| stopped.position_mm.last().copied());
-    test_axis.apply(&zero_gain_settings(base))?;
+    if error.is_interrupted() || test_axis.apply(&zero_gain_settings(base)).is_err() {
+        return error;
+    }
     let level_v = motor
         .level_v
-        .min(0.5 * MOST_SHARE * base.amplifier.output_limit_v);
+        .min(MOST_SHARE * base.amplifier.output_limit_v);
     let inwards_v = -level_v * stands_mm.unwrap_or_default().signum();
     let shown = test_axis.perform(&holds(inwards_v, test_axis.info().rate_hz), &mut |_| {});
     // A force gathers too much speed, and is stopped.
     let shown = shown.ok().and_then(|recording| Holds::of(&recording));
-    Err(shown
+    shown
         .and_then(|holds| holds.velocity_mode())
-        .unwrap_or(error))
+        .unwrap_or(error)
 }
 
-/// Share of the output limit that the test takes at most.
-const MOST_SHARE: f64 = 0.5;
+/// Largest lower voltage over the output limit.
+const MOST_SHARE: f64 = 0.25;
 /// Time of a hold, and at rest after it, s: the velocity follows for five times a lag of 20 ms, and is measured in the last quarter.
 const HOLD_S: f64 = 0.15;
 const REST_S: f64 = 0.1;
