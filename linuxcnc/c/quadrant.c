@@ -188,11 +188,14 @@ void rtapi_app_exit(void)
 {
     int n;
 
-    /* A period under way ends, none begins, and zero is what the signals keep. */
+    /* A period under way ends, none begins, and the signals keep zero and a fault, by which LinuxCNC stops. */
     ends = 1;
     usleep(20000);
-    for (n = 0; n < 3; n++)
-        if (has(n)) *hal->joint[n].output = 0.0;
+    for (n = 0; n < 3; n++) {
+        if (!has(n)) continue;
+        *hal->joint[n].output = 0.0;
+        *hal->joint[n].faulted = 1;
+    }
     *hal->driven = 0;
     hal_exit(comp_id);
     quadrant_stop(board);

@@ -8,17 +8,23 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-// Number on `fault`: the outputs could not be enabled: no axis is commissioned, the settings are damaged, or an axis moves.
+// The outputs could not be enabled: no axis is commissioned, the settings are damaged, or an axis moves.
 #define NOT_ENABLED 100
 
-// Number on `fault`: a joint no longer follows LinuxCNC: a host has stopped it, or its settings want it homed by the law.
+// A joint no longer follows LinuxCNC: a host has stopped it, or its settings want it homed by the law.
 #define ENDED 101
 
-// Number on `fault`: the thread's period is not the one that the settings are for.
+// The thread's period is not the one that the settings are for.
 #define OTHER_PERIOD 102
 
-// Number on `fault`: the command is no number, or faster than 100 m/s.
+// The command is no number, or faster than 100 m/s.
 #define NO_NUMBER 103
+
+// A host drove the axes when LinuxCNC's machine was switched on.
+#define HOST_DRIVES 104
+
+// Position and count do not grow together as the settings' resolution says.
+#define OTHER_SCALE 105
 
 // Most ticks by which a command can be delayed.
 #define MOST_DELAY_TICKS 31

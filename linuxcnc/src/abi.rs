@@ -60,7 +60,7 @@ pub struct QuadrantPlantConfig {
     pub room: c_int,
 }
 
-/// A text parameter; `none` or an empty one is none.
+/// A text parameter; an empty one is none.
 ///
 /// # Safety
 /// Null, or a text that ends with a zero and outlives the result.
@@ -71,7 +71,22 @@ unsafe fn text<'a>(pointer: *const c_char) -> io::Result<Option<&'a str>> {
     // SAFETY: as the caller says.
     let text = unsafe { CStr::from_ptr(pointer) };
     let text = text.to_str().map_err(io::Error::other)?;
-    Ok((!matches!(text, "" | "none")).then_some(text))
+    Ok((!text.is_empty()).then_some(text))
+}
+
+/// A file; `none` is none, so that an INI file can say it.
+fn file(given: Option<&str>) -> Option<&Path> {
+    given.filter(|given| *given != "none").map(Path::new)
+}
+
+/// Checks that a number is from `least` to `most`.
+fn within(name: &str, given: c_int, [least, most]: [c_int; 2]) -> io::Result<()> {
+    if (least..=most).contains(&given) {
+        return Ok(());
+    }
+    Err(io::Error::other(format!(
+        "{name}={given}: give {least} to {most}"
+    )))
 }
 
 /// The choice of a parameter: the first without one.
@@ -105,6 +120,8 @@ pub unsafe extern "C" fn quadrant_start(config: &QuadrantConfig) -> *mut Board {
     started("quadrant", || {
         // SAFETY: as the caller says; nothing of it is kept.
         let text = |pointer| unsafe { text(pointer) };
+        within("port", config.port, [0, 65_535])?;
+        within("late", config.late, [0, 1_000_000])?;
         let mut joints = [false; 3];
         for joint in text(config.joints)?.unwrap_or("x,y,z").split(',') {
             let axis = AxisName::ALL
@@ -119,8 +136,8 @@ pub unsafe extern "C" fn quadrant_start(config: &QuadrantConfig) -> *mut Board {
             config.port
         );
         let place = Place {
-            store: text(config.settings)?.map(Path::new),
-            defaults: text(config.defaults)?.map(Path::new),
+            store: file(text(config.settings)?),
+            defaults: file(text(config.defaults)?),
             address: (config.port > 0).then_some(address.as_str()),
             rate_hz: f64::from(config.rate),
         };
@@ -182,20 +199,14 @@ pub unsafe extern "C" fn quadrant_plant_start(config: &QuadrantPlantConfig) -> *
     started("quadrant_plant", || {
         // SAFETY: as the caller says; nothing of it is kept.
         let text = |pointer| unsafe { text(pointer) };
-        let mut truth = match text(config.file)? {
-            Some(path) => {
-                StageFile::read(Path::new(path))
-                    .map_err(io::Error::other)?
-                    .truth
-            }
+        let mut truth = match file(text(config.file)?) {
+            Some(path) => StageFile::read(path).map_err(io::Error::other)?.truth,
             None => StageParameters::real(),
         };
-        if config.rate < 100 {
-            return Err(io::Error::other(format!(
-                "rate={}: give the thread's rate, Hz",
-                config.rate
-            )));
-        }
+        within("rate", config.rate, [100, 100_000])?;
+        within("drive_lag_us", config.drive_lag_us, [0, 1_000_000])?;
+        // A tick of the record takes 48 bytes.
+        within("room", config.room, [0, 10_000_000])?;
         if config.drive_lag_us > 0 {
             let lag_s = 1e-6 * f64::from(config.drive_lag_us);
             truth = truth.in_velocity_mode(lag_s);
@@ -204,7 +215,7 @@ pub unsafe extern "C" fn quadrant_plant_start(config: &QuadrantPlantConfig) -> *
             &truth,
             f64::from(config.rate),
             u64::from(config.seed.unsigned_abs()),
-            text(config.record)?.map(PathBuf::from),
+            file(text(config.record)?).map(PathBuf::from),
             usize::try_from(config.room).unwrap_or(0),
         ))
     })

@@ -12,17 +12,10 @@ use quadrant_law::motion::MotionMode;
 use quadrant_law::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
 use quadrant_law::stage::{Inputs, Outputs};
 
+use crate::encoder_scale::EncoderScale;
+use crate::fault::{ENDED, HOST_DRIVES, NO_NUMBER, NOT_ENABLED, OTHER_PERIOD, OTHER_SCALE};
 use crate::reference::{CommandPins, CommandReference, Preview};
 use crate::slow::{self, FastEnds, Place, Report, SlowThread, Wish};
-
-/// Number on `fault`: the outputs could not be enabled: no axis is commissioned, the settings are damaged, or an axis moves.
-pub const NOT_ENABLED: i32 = 100;
-/// Number on `fault`: a joint no longer follows LinuxCNC: a host has stopped it, or its settings want it homed by the law.
-pub const ENDED: i32 = 101;
-/// Number on `fault`: the thread's period is not the one that the settings are for.
-pub const OTHER_PERIOD: i32 = 102;
-/// Number on `fault`: the command is no number, or faster than 100 m/s.
-pub const NO_NUMBER: i32 = 103;
 
 /// Largest velocity of a command that is one, mm/s.
 const MOST_MM_S: f64 = 1e5;
@@ -138,6 +131,7 @@ struct Joint {
     /// A positive count moves the law's position down.
     reversed: bool,
     reference: CommandReference,
+    scale: EncoderScale,
     rawcounts: i32,
     /// The gains that the pins show.
     gains: [f64; 5],
@@ -155,6 +149,9 @@ pub struct Board {
     joints: [Option<Joint>; 3],
     options: Options,
     mm_to_units: f64,
+    rate_hz: f64,
+    /// The previews that act, s.
+    previews_s: [f64; 3],
     /// Shortest and longest period that the settings are for, ns.
     periods_ns: [i64; 2],
     last_ns: i64,
@@ -165,6 +162,8 @@ pub struct Board {
     /// Ticks in which the outputs are yet to be enabled.
     enabling: u32,
     fault: i32,
+    /// The number on the pins.
+    shown: i32,
     // Ends before what it is joined with.
     _thread: SlowThread,
 }
@@ -179,8 +178,6 @@ impl Board {
         let settings = &started.settings;
         let rate_hz = settings.rate_hz;
         let period_ns = 1e9 / rate_hz;
-        let ticks = |axis: usize| (settings.axes[axis].feedforward.preview_s * rate_hz).round();
-        let longest = (0..3).map(ticks).fold(0.0, f64::max);
         let mut joints = [None, None, None];
         for (index, name) in AxisName::ALL.into_iter().enumerate() {
             let axis = &settings.axes[index];
@@ -199,13 +196,8 @@ impl Board {
                 resolution_mm,
                 counts_per_mm: 1.0 / resolution_mm,
                 reversed: axis.encoder.reversed,
-                reference: CommandReference::new(
-                    resolution_mm,
-                    rate_hz,
-                    options.preview,
-                    axis.feedforward.preview_s,
-                    (longest - ticks(index)) as usize,
-                ),
+                reference: CommandReference::new(resolution_mm, rate_hz, options.preview),
+                scale: EncoderScale::default(),
                 rawcounts: 0,
                 gains: [0.0; 5],
                 was_enabled: false,
@@ -214,12 +206,14 @@ impl Board {
                 volts_per_code: 0.0,
             });
         }
-        Ok(Self {
+        let mut board = Self {
             control: started.control,
             ends: started.ends,
             joints,
             options,
             mm_to_units: 1.0 / options.unit_mm,
+            rate_hz,
+            previews_s: [0.0; 3],
             periods_ns: [-1.0, 1.0]
                 .map(|sign| (period_ns * (1.0 + sign * PERIOD_TOLERANCE)) as i64),
             last_ns: 0,
@@ -228,8 +222,28 @@ impl Board {
             timing: TimingStatistics::default(),
             enabling: 0,
             fault: 0,
+            shown: 0,
             _thread: started.thread,
-        })
+        };
+        board.preview(
+            settings
+                .axes
+                .each_ref()
+                .map(|axis| axis.feedforward.preview_s),
+        );
+        Ok(board)
+    }
+
+    /// Takes the axes' previews, s: with `delay`, all joints lag by the longest.
+    fn preview(&mut self, previews_s: [f64; 3]) {
+        self.previews_s = previews_s;
+        let ticks = previews_s.map(|preview_s| (preview_s * self.rate_hz).round());
+        let longest = ticks.into_iter().fold(0.0, f64::max);
+        for joint in self.joints.iter_mut().flatten() {
+            let index = joint.name as usize;
+            let wait = (longest - ticks[index]) as usize;
+            joint.reference.preview(previews_s[index], wait);
+        }
     }
 
     /// The application's fast half.
@@ -247,6 +261,9 @@ impl Board {
             self.frames = answer.frames;
             self.control.show_glitches(answer.glitches);
             inputs.command = answer.command;
+            if answer.previews_s != self.previews_s {
+                self.preview(answer.previews_s);
+            }
             if answer.wishes == self.wishes {
                 for joint in self.joints.iter_mut().flatten() {
                     let gains = answer.gains[joint.name as usize];
@@ -270,6 +287,7 @@ impl Board {
             let _ = self.ends.reports.enqueue(Report {
                 seen: self.control.snapshot(),
                 timing: self.timing,
+                fault: self.shown,
             });
         }
     }
@@ -308,8 +326,16 @@ impl Board {
                 });
             }
             let sign = if joint.reversed { -1 } else { 1 };
+            let moved = sign * i64::from(step);
+            let counted_mm = moved as f64 * joint.resolution_mm;
+            if !self.options.counts_of_position
+                && !joint.scale.agrees(counted_mm, position_mm)
+                && seen.enable
+            {
+                self.fault = OTHER_SCALE;
+            }
             let before = self.control.state().axes()[joint.name].telemetry().measured;
-            let measured = before.0 + sign * i64::from(step);
+            let measured = before.0 + moved;
             let begins = joint.hold == Hold::Released;
             let command_mm = seen.position_cmd * self.options.unit_mm;
             let command = CommandPins {
@@ -379,9 +405,11 @@ impl Board {
         if fell || any && (self.fault != 0 || matches!(safety, SafetyState::Stopping(_))) {
             return safety.drives().then_some(Command::Disable);
         }
-        // A host had the axes: what it moves ends here.
+        // Two cannot lead: all ends here, and LinuxCNC does not take over what it has not seen begin.
         let mut joints = self.joints.iter().flatten();
         if rose && safety.drives() && !joints.any(|joint| joint.hold == Hold::Leads) {
+            self.fault = HOST_DRIVES;
+            self.enabling = 0;
             return Some(Command::Disable);
         }
         if self.enabling > 0 {
@@ -451,6 +479,7 @@ impl Board {
         } else {
             self.fault
         };
+        self.shown = fault;
         for joint in self.joints.iter_mut().flatten() {
             let axis = &self.control.state().axes()[joint.name];
             let codes_per_volt = self.control.stage().axes[joint.name].codes_per_volt().abs();
@@ -460,9 +489,11 @@ impl Board {
             let seen = axis.telemetry();
             let terms = &seen.feedforward;
             let place = &mut pins.joints[joint.name as usize];
-            place.output = if !pins.driven {
+            // A host's motion would add the whole law to the other loop.
+            let silent = self.options.feedforward_only && joint.hold != Hold::Leads;
+            place.output = if !pins.driven || silent {
                 0.0
-            } else if self.options.feedforward_only && joint.hold == Hold::Leads {
+            } else if self.options.feedforward_only {
                 terms.total().into()
             } else {
                 f64::from(outputs.codes[joint.name].0) * joint.volts_per_code

@@ -9,12 +9,17 @@ use quadrant::hal::Serial;
 /// Silence after which a client gives way to another one.
 const SILENT: Duration = Duration::from_secs(10);
 
+/// Bytes that a client may have waiting, each request being answered before the next: the one that has more is sent away.
+const MOST_WAITING: usize = 16 * 1024;
+
 /// A listening socket, as a port that never waits.
 pub(crate) struct Port {
     listener: Option<TcpListener>,
     client: Option<TcpStream>,
     /// Time at which the client last sent something.
     heard: Instant,
+    /// Place for what is waiting.
+    waiting: Box<[u8]>,
 }
 
 impl Port {
@@ -28,6 +33,7 @@ impl Port {
             listener,
             client: None,
             heard: Instant::now(),
+            waiting: vec![0; MOST_WAITING].into(),
         })
     }
 
@@ -74,6 +80,13 @@ impl Serial for Port {
         let Some(client) = &mut self.client else {
             return 0;
         };
+        if client
+            .peek(&mut self.waiting)
+            .is_ok_and(|count| count == MOST_WAITING)
+        {
+            self.client = None;
+            return 0;
+        }
         let read = client.read(into);
         let count = self.exchanged(read);
         if count > 0 {
@@ -130,6 +143,17 @@ mod tests {
             assert_eq!(read(&mut port), words);
             drop(client);
         }
+    }
+
+    #[test]
+    fn a_client_that_floods_gives_way_to_the_next_at_once() {
+        let mut port = Port::listen(Some("127.0.0.1:0")).unwrap();
+        let flood = connect(&port, &[1; 60_000]);
+        std::thread::sleep(Duration::from_millis(50));
+        while port.read(&mut [0; 16]) > 0 {}
+        let _next = connect(&port, b"six");
+        assert_eq!(read(&mut port), b"six");
+        drop(flood);
     }
 
     #[test]

@@ -58,28 +58,25 @@ pub struct Led {
 }
 
 impl CommandReference {
-    /// For a count of `resolution_mm`. `preview_s` is the axis' preview, `wait_ticks` by how much it is shorter than the longest.
-    pub fn new(
-        resolution_mm: f64,
-        rate_hz: f64,
-        preview: Preview,
-        preview_s: f64,
-        wait_ticks: usize,
-    ) -> Self {
-        let extrapolates = preview == Preview::Extrapolate;
+    /// For a count of `resolution_mm`, without a preview.
+    pub fn new(resolution_mm: f64, rate_hz: f64, preview: Preview) -> Self {
         Self {
             units_per_mm: POSITION_UNITS_PER_COUNT / resolution_mm,
             rate_hz,
-            extrapolated_s: if extrapolates {
-                preview_s - KNOWN_PERIODS / rate_hz
-            } else {
-                0.0
-            },
-            delay_ticks: (!extrapolates).then_some(wait_ticks.min(MOST_DELAY_TICKS)),
+            extrapolated_s: 0.0,
+            delay_ticks: (preview == Preview::Delay).then_some(0),
             units: 0.0,
             velocity_mm_s: 0.0,
             past: [ReferenceSample::default(); MOST_DELAY_TICKS + 1],
             place: 0,
+        }
+    }
+
+    /// Takes the axis' preview, and by how many ticks it is shorter than the longest of all axes.
+    pub fn preview(&mut self, preview_s: f64, wait_ticks: usize) {
+        match &mut self.delay_ticks {
+            Some(delay) => *delay = wait_ticks.min(MOST_DELAY_TICKS),
+            None => self.extrapolated_s = preview_s - KNOWN_PERIODS / self.rate_hz,
         }
     }
 

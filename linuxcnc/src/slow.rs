@@ -10,15 +10,15 @@ use std::time::Duration;
 use heapless_queues::spsc::{Consumer, Producer, Queue};
 use quadrant::app::glitch_monitor::GlitchReadings;
 use quadrant::app::{Control, Poll, Snapshot, TimingStatistics};
-use quadrant_host::machine::FlashFile;
 use quadrant_host::machine::application::{BoardIdentity, SlowHalf, Start, start_halves};
-use quadrant_host::machine::memory_flash::{self, MemoryFlash};
+use quadrant_host::machine::memory_flash::MemoryFlash;
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
-use quadrant_link::message::NumberType;
+use quadrant_link::message::{Event, NumberType, text};
 use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_sim::settings_file::{SettingsFile, defaults_at};
 
+use crate::fault;
 use crate::port::Port;
 
 /// Time between two looks for a snapshot.
@@ -35,6 +35,8 @@ const IDENTITY: BoardIdentity = BoardIdentity {
 pub(crate) struct Report {
     pub(crate) seen: Snapshot<f32>,
     pub(crate) timing: TimingStatistics,
+    /// Number of the fault on the pins; 0 for none.
+    pub(crate) fault: i32,
 }
 
 /// Gains of an axis that can be set live: P, I and D, viscous friction and inertia; V, mm and s.
@@ -56,6 +58,8 @@ pub(crate) struct Answer {
     /// The gains in force, and the number of wishes that they know of.
     pub(crate) gains: [Gains; 3],
     pub(crate) wishes: u32,
+    /// The axes' previews, s.
+    pub(crate) previews_s: [f64; 3],
 }
 
 /// One report: while it waits, newer ones are dropped, and the next is at most some ticks old.
@@ -116,16 +120,19 @@ pub(crate) struct Started {
 /// Starts the application, with the slow half in a thread of its own.
 pub(crate) fn start(place: &Place<'_>) -> io::Result<Started> {
     let defaults = match place.defaults {
+        // A pipe would be waited for.
+        Some(path) if std::fs::metadata(path).is_ok_and(|data| !data.is_file()) => {
+            let text = format!("defaults={}: it is no file", path.display());
+            return Err(io::Error::other(text));
+        }
         Some(path) => SettingsFile::read(path).map_err(io::Error::other)?.stage,
         None => StageSettings {
             rate_hz: place.rate_hz,
             ..defaults_at(place.rate_hz)
         },
     };
-    let open = |path| FlashFile::open(path, memory_flash::BYTES);
-    let file = place.store.map(open).transpose()?;
-    let kept = file.as_ref().map(|file| file.content().to_vec());
-    let flash = kept.and_then(MemoryFlash::of).unwrap_or_default();
+    let flash = place.store.map(MemoryFlash::kept_in).transpose()?;
+    let flash = flash.unwrap_or_default();
     let begin = Start {
         defaults: &defaults,
         plan: &PlanSettings::default(),
@@ -142,12 +149,12 @@ pub(crate) fn start(place: &Place<'_>) -> io::Result<Started> {
     let store_failed = Arc::new(AtomicBool::new(false));
     let slow = Slow {
         half,
-        file,
         port,
         reports: reports_out,
         answers: answers_in,
         wishes: wishes_out,
         served: 0,
+        fault: 0,
         outputs_off: Arc::clone(&outputs_off),
         store_failed: Arc::clone(&store_failed),
     };
@@ -209,13 +216,14 @@ fn set(axis: &mut AxisSettings, gains: Gains) {
 /// Everything that the thread owns.
 struct Slow {
     half: SlowHalf<f32>,
-    file: Option<FlashFile>,
     port: Port,
     reports: Consumer<'static, Report, 2>,
     answers: Producer<'static, Answer, 8>,
     wishes: Consumer<'static, Wish, 8>,
     /// Wishes served so far; wraps.
     served: u32,
+    /// The fault that was reported last.
+    fault: i32,
     outputs_off: Arc<AtomicBool>,
     /// The file does not keep what a host has stored.
     store_failed: Arc<AtomicBool>,
@@ -245,6 +253,7 @@ impl Slow {
                 eprintln!("quadrant: the gains of {} stay: {error}", wish.axis);
             }
         }
+        self.report_fault(report);
         let after = self.half.run(&report.seen, report.timing, &mut self.port);
         if after == Poll::Reboot {
             eprintln!(
@@ -252,16 +261,35 @@ impl Slow {
             );
             self.half.server().go_on();
         }
-        if let Some(file) = &mut self.file {
-            let kept = file.keep(self.half.flash().bytes());
-            let failed = self.store_failed.swap(kept.is_err(), Ordering::Relaxed);
-            if let Err(error) = kept
-                && !failed
-            {
-                eprintln!("quadrant: {error}");
-            }
+        let failure = self.half.flash().failure();
+        let failed = self.store_failed.swap(failure.is_some(), Ordering::Relaxed);
+        if let Some(failure) = failure
+            && !failed
+        {
+            eprintln!("quadrant: {failure}");
         }
         self.answer();
+    }
+
+    /// Prints a fault that appears on the pins, and sends one that the law does not know to the host.
+    fn report_fault(&mut self, report: &Report) {
+        let before = std::mem::replace(&mut self.fault, report.fault);
+        if report.fault == before {
+            return;
+        }
+        let Some([cause, remedy]) = fault::text(report.fault) else {
+            return;
+        };
+        let number = report.fault;
+        eprintln!("quadrant: fault {number}: {cause}; {remedy}");
+        if number >= fault::NOT_ENABLED {
+            let text = text(format_args!(
+                "fault {number} under LinuxCNC: {cause}; {remedy}"
+            ));
+            self.half
+                .server()
+                .push_event(report.seen.tick, Event::Refused(text));
+        }
     }
 
     /// Passes the commands of this run on, as far as there is room; the rest goes with the next.
@@ -274,10 +302,12 @@ impl Slow {
             if command.is_none() && round > 0 {
                 return;
             }
-            let gains = &self.half.server().acting().axes;
-            let gains = gains.each_ref().map(gains_of);
+            let axes = &self.half.server().acting().axes;
+            let gains = axes.each_ref().map(gains_of);
+            let previews_s = axes.each_ref().map(|axis| axis.feedforward.preview_s);
             let answer = Answer {
                 gains,
+                previews_s,
                 wishes: self.served,
                 command,
                 frames: self.half.frames(),

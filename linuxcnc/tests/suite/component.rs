@@ -57,6 +57,8 @@ pub(crate) struct Component {
     pub(crate) stage: QuadrantPlantPins,
     /// Added to the position that LinuxCNC sees and commands, mm.
     pub(crate) origin_mm: f64,
+    /// Position that LinuxCNC sees over that of the encoder.
+    pub(crate) scale: f64,
     tick: u32,
     /// Positions of the joints when they were enabled, mm.
     start_mm: [f64; 3],
@@ -128,6 +130,7 @@ impl Component {
             },
             stage: QuadrantPlantPins::default(),
             origin_mm: 0.0,
+            scale: 1.0,
             tick: 0,
             start_mm: [0.0; 3],
             _folder: folder,
@@ -169,12 +172,13 @@ impl Component {
         // SAFETY: both were started, and this is the only thread that uses them.
         unsafe { quadrant_plant_read(self.plant, &mut self.stage) };
         if enable && !self.pins.joints[0].enable {
-            self.start_mm = self.stage.axes.map(|axis| axis.position_fb);
+            let scale = self.scale;
+            self.start_mm = self.stage.axes.map(|axis| axis.position_fb * scale);
         }
         for index in 0..3 {
             let (joint, axis) = (&mut self.pins.joints[index], &self.stage.axes[index]);
             joint.rawcounts = axis.rawcounts;
-            joint.position_fb = axis.position_fb + self.origin_mm;
+            joint.position_fb = axis.position_fb * self.scale + self.origin_mm;
             joint.position_cmd = if enable {
                 self.start_mm[index] + positions[index] + self.origin_mm
             } else {

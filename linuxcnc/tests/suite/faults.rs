@@ -4,7 +4,7 @@ use std::fs;
 use std::time::{Duration, Instant};
 
 use quadrant_law::safety::FaultCode;
-use quadrant_linuxcnc::board::{NO_NUMBER, NOT_ENABLED, OTHER_PERIOD};
+use quadrant_linuxcnc::fault::{NO_NUMBER, NOT_ENABLED, OTHER_PERIOD, OTHER_SCALE};
 use quadrant_sim::settings_file::defaults_at;
 
 use crate::component::{Component, PERIOD_NS, Parameters, RATE_HZ, settings};
@@ -201,4 +201,15 @@ fn a_velocity_that_no_machine_has_switches_off() {
     let position = [component.stage.axes[0].position_fb; 3];
     component.step_along(true, position, [1e20; 3]);
     assert_off(&component, NO_NUMBER);
+}
+
+#[test]
+fn a_position_that_does_not_move_as_the_count_does_switches_off() {
+    for scale in [0.8, 1.2] {
+        let mut component = Component::start(&Parameters::default());
+        component.scale = scale;
+        component.run(20, false);
+        component.run(8_000, true);
+        assert_off(&component, OTHER_SCALE);
+    }
 }

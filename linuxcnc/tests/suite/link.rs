@@ -8,11 +8,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use quadrant_host::client::{Client, settings};
+use quadrant_host::client::{Client, settings, test_axis::ConnectedAxis};
 use quadrant_host::machine::TcpTransport;
-use quadrant_link::message::{AxisMode, AxisName, Body};
+use quadrant_law::reference::MotionSettings;
+use quadrant_link::message::{AxisMode, AxisName, Body, MachineState, Notice};
+use quadrant_tune::test_axis::{Drive, Experiment, TestAxis, Travel};
 
 use crate::component::{Component, Parameters};
 
@@ -65,6 +67,16 @@ impl Ticking {
         }
     }
 
+    /// The events so far, a line each.
+    fn events(&mut self) -> String {
+        let notices = self.client.take_notices();
+        let events = notices.filter_map(|notice| match notice {
+            Notice::Event { event, .. } => Some(format!("{event}\n")),
+            _ => None,
+        });
+        events.collect()
+    }
+
     /// Ends the ticks; returns the component as they left it.
     fn end(self) -> Component {
         self.ends.store(true, Ordering::Relaxed);
@@ -83,7 +95,7 @@ fn a_host_talks_to_the_component_while_it_ticks() {
 }
 
 #[test]
-fn a_machine_that_is_switched_on_takes_a_joint_from_the_host_that_moves_it() {
+fn a_machine_that_is_switched_on_while_a_host_moves_switches_all_off_and_leads_at_the_next_time() {
     let mut ticking = Ticking::start();
     ticking.client.order(Body::Enable).unwrap();
     let jog = Body::Jog {
@@ -95,11 +107,60 @@ fn a_machine_that_is_switched_on_takes_a_joint_from_the_host_that_moves_it() {
     ticking.on.store(true, Ordering::Relaxed);
     thread::sleep(Duration::from_millis(200));
     let status = ticking.client.status().unwrap();
-    for axis in &status.axes {
+    assert_eq!(status.state, MachineState::Disabled);
+    let events = ticking.events();
+    let text = "fault 104 under LinuxCNC: a host drove the axes";
+    assert!(events.contains(text), "{events}");
+    for on in [false, true] {
+        ticking.on.store(on, Ordering::Relaxed);
+        thread::sleep(Duration::from_millis(500));
+    }
+    for axis in &ticking.client.status().unwrap().axes {
         assert_eq!(axis.mode, AxisMode::Plan);
     }
     let component = ticking.end();
     assert!(component.pins.driven && !component.pins.joints[0].faulted);
+}
+
+#[test]
+fn an_experiment_ends_at_once_when_the_machine_is_switched_on() {
+    let mut ticking = Ticking::start();
+    let on = Arc::clone(&ticking.on);
+    let travel = Travel::either_way(5.0);
+    let mut axis =
+        ConnectedAxis::new(&mut ticking.client, quadrant_law::axes::AxisName::X, travel).unwrap();
+    let experiment = Experiment {
+        name: "rest".to_owned(),
+        drive: Drive::ClosedLoop(MotionSettings::Hold),
+        injection_v: vec![0.001; 4 * 8_000],
+        decimation: 4,
+        time_limit_s: 30.0,
+    };
+    let switch = thread::spawn(move || {
+        thread::sleep(Duration::from_millis(500));
+        on.store(true, Ordering::Relaxed);
+    });
+    let began = Instant::now();
+    let error = axis
+        .perform(&experiment, &mut |_| {})
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("outputs went off"), "{error}");
+    assert!(began.elapsed() < Duration::from_secs(5));
+    switch.join().unwrap();
+    ticking.end();
+}
+
+#[test]
+fn an_interruption_of_a_host_that_moves_nothing_leaves_the_joints_to_linuxcnc() {
+    let mut ticking = Ticking::start();
+    ticking.on.store(true, Ordering::Relaxed);
+    thread::sleep(Duration::from_millis(200));
+    let interrupt = ticking.client.interrupt();
+    interrupt.request();
+    ticking.client.wait(Duration::from_millis(50)).unwrap_err();
+    thread::sleep(Duration::from_millis(200));
+    assert!(ticking.end().pins.driven);
 }
 
 #[test]
@@ -113,12 +174,12 @@ fn a_host_that_stops_a_joint_that_linuxcnc_leads_switches_it_off_and_shows_it() 
     assert_eq!(component.outputs(), [0.0; 3]);
     assert_eq!(
         component.pins.joints[0].fault,
-        quadrant_linuxcnc::board::ENDED
+        quadrant_linuxcnc::fault::ENDED
     );
 }
 
 #[test]
-fn a_store_that_cannot_be_written_is_shown_on_a_pin() {
+fn a_store_that_cannot_be_written_is_refused_and_shown_on_a_pin() {
     for is_there in [true, false] {
         let folder = tempfile::tempdir().unwrap();
         let below = folder.path().join("below");
@@ -127,7 +188,8 @@ fn a_store_that_cannot_be_written_is_shown_on_a_pin() {
         if !is_there {
             fs::remove_dir_all(&below).unwrap();
         }
-        settings::store(&mut ticking.client, "").unwrap();
+        let stored = settings::store(&mut ticking.client, "");
+        assert_eq!(stored.is_ok(), is_there);
         thread::sleep(Duration::from_millis(300));
         assert_eq!(ticking.end().pins.store_failed, !is_there);
     }

@@ -15,7 +15,8 @@ fn sine_mm(time_s: f64) -> f64 {
 
 /// The samples that a reference makes of the sine, tick by tick.
 fn led(preview: Preview) -> Vec<Led> {
-    let mut reference = CommandReference::new(RESOLUTION_MM, RATE_HZ, preview, PREVIEW_S, 2);
+    let mut reference = CommandReference::new(RESOLUTION_MM, RATE_HZ, preview);
+    reference.preview(PREVIEW_S, 2);
     (0..500)
         .map(|tick| {
             let time_s = f64::from(tick) / RATE_HZ;

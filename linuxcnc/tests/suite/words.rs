@@ -19,13 +19,10 @@ fn the_voltages_are_the_laws_words_bit_for_bit() {
     let mut references = [0, 1, 2].map(|index| {
         let axis = &settings.axes[index];
         let longest = (1.3e-3 * RATE_HZ).round() - (axis.feedforward.preview_s * RATE_HZ).round();
-        CommandReference::new(
-            axis.encoder.resolution_mm,
-            RATE_HZ,
-            Preview::Extrapolate,
-            axis.feedforward.preview_s,
-            longest as usize,
-        )
+        let resolution_mm = axis.encoder.resolution_mm;
+        let mut reference = CommandReference::new(resolution_mm, RATE_HZ, Preview::Extrapolate);
+        reference.preview(axis.feedforward.preview_s, longest as usize);
+        reference
     });
     let mut component = Component::start(&Parameters::default());
     let (mut followed, mut first) = (0, None);

@@ -120,7 +120,9 @@ pub enum ClientError {
         remedy: String,
     },
     /// A motion is under way, which a measurement would mistake for its own.
-    #[error("an axis moves: `stop`, and measure when all axes stand")]
+    #[error(
+        "an axis moves, or LinuxCNC leads it: `stop`, or machine off, and measure when all axes stand"
+    )]
     Moving,
     /// Settings of the draft are edited, and a measurement would write its own over them.
     #[error(

@@ -18,6 +18,11 @@ impl FlashFile {
     /// # Errors
     /// A file that cannot be read or written, or of another size.
     pub fn open(path: &Path, bytes: usize) -> io::Result<Self> {
+        // A pipe or a terminal would be waited for.
+        if std::fs::metadata(path).is_ok_and(|data| !data.is_file()) {
+            let error = io::Error::other("it is no file");
+            return Err(with_path(path, "cannot be read", &error));
+        }
         let kept = match std::fs::read(path) {
             Ok(kept) => kept,
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
@@ -82,6 +87,7 @@ mod tests {
         assert_eq!(file.content(), [0xFF; 8]);
         file.keep(&[1; 8]).unwrap();
         assert_eq!(FlashFile::open(&path, 8).unwrap().content(), [1; 8]);
+        FlashFile::open(Path::new("/dev/zero"), 8).unwrap_err();
         let error = FlashFile::open(&path, 9).unwrap_err().to_string();
         assert!(
             error.contains("settings.flash has 8 bytes") && error.contains("9"),

@@ -8,9 +8,8 @@ use quadrant_law::safety::Switches;
 use quadrant_law::supervisor::PERIOD_TICKS;
 use quadrant_sim::stage_setup::StageSetup;
 
-use super::flash_file::FlashFile;
 use super::loopback::{Loopback, SimulatedPeer};
-use super::memory_flash::{self, MemoryFlash};
+use super::memory_flash::MemoryFlash;
 use super::simulated::SimulatedMachine;
 use super::simulated_io::SimulatedIo;
 use super::timing::server_period;
@@ -18,7 +17,6 @@ use super::timing::server_period;
 /// The firmware's application on a simulated stage, and the bytes to and from it.
 pub struct SimulatedLink {
     machine: SimulatedMachine,
-    flash: Option<FlashFile>,
     period: Duration,
 }
 
@@ -37,19 +35,13 @@ impl SimulatedLink {
             truth,
             marks,
         } = setup;
-        let flash = flash
-            .map(|path| FlashFile::open(path, memory_flash::BYTES))
-            .transpose()?;
-        let content = flash
-            .as_ref()
-            .and_then(|file| MemoryFlash::of(file.content().to_vec()))
-            .unwrap_or_default();
-        let mut machine = SimulatedMachine::with_flash(settings, truth, seed, content)
-            .map_err(io::Error::other)?;
+        let flash = flash.map(MemoryFlash::kept_in).transpose()?;
+        let flash = flash.unwrap_or_default();
+        let mut machine =
+            SimulatedMachine::with_flash(settings, truth, seed, flash).map_err(io::Error::other)?;
         machine.plant_mut().set_marks(*marks);
         Ok(Loopback::new(Self {
             machine,
-            flash,
             period: server_period(settings),
         }))
     }
@@ -62,9 +54,6 @@ impl SimulatedPeer for SimulatedLink {
         // An answer of the emulated board is seen a tick late. SimulatedIo are to act in the same tick on both.
         while self.machine.tick() % PERIOD_TICKS != 1 {
             self.machine.run(1);
-        }
-        if let Some(file) = &mut self.flash {
-            file.keep(self.machine.flash().bytes())?;
         }
         Ok(self.machine.receive())
     }

@@ -38,6 +38,10 @@ const ENDS_EXPERIMENTS: [FaultCode; 3] = [
 ];
 /// Time in which the axis comes to rest after one of them.
 const COASTING: Duration = Duration::from_millis(500);
+/// Reason of an end that nobody asked this session for.
+const SWITCHED_OFF: ClientError = ClientError::Interrupted {
+    done: "the outputs went off, and not by this program: an operator, another host, or LinuxCNC's machine on",
+};
 /// Time in which the outputs come on.
 const ENABLING: Duration = Duration::from_millis(100);
 
@@ -53,6 +57,8 @@ pub struct ConnectedAxis<'a> {
     travel: Travel,
     /// The machine's position of the middle of the travel, mm.
     origin_mm: f64,
+    /// The outputs may be off: they were not enabled yet, or this has switched them off, or a fault that is reset.
+    may_be_off: bool,
     /// The recording of the last experiment, if that was stopped.
     interrupted: Option<Recording>,
 }
@@ -80,6 +86,7 @@ impl<'a> ConnectedAxis<'a> {
             stage,
             travel,
             origin_mm,
+            may_be_off: true,
             interrupted: None,
         })
     }
@@ -132,6 +139,12 @@ impl<'a> ConnectedAxis<'a> {
                     injected: None,
                 };
                 self.interrupted = samples.ok().and_then(|samples| shape.recording(&samples));
+                // The injection may end before the outputs are seen to be off.
+                if matches!(stop, Stop::Broken(_))
+                    && self.client.status()?.state == MachineState::Disabled
+                {
+                    return Err(SWITCHED_OFF.into());
+                }
                 return Err(stop);
             }
         };
@@ -190,6 +203,9 @@ impl<'a> ConnectedAxis<'a> {
             progress((elapsed.as_secs_f64() / experiment.time_limit_s).min(1.0));
             let status = self.client.status()?;
             self.client.refuse_fault("the experiment", &status)?;
+            if status.state == MachineState::Disabled {
+                return Err(SWITCHED_OFF.into());
+            }
             // Axes that brake for a fault have it latched when they stand.
             let ends = !status.running && status.state != MachineState::Stopping;
             if elapsed >= least && ends {
@@ -217,6 +233,7 @@ impl<'a> ConnectedAxis<'a> {
             // Where it cannot be reset, the next experiment says so.
             let _ = self.client.wait(COASTING);
             let _ = self.client.order(Body::ResetFault);
+            self.may_be_off = true;
         }
     }
 
@@ -228,15 +245,19 @@ impl<'a> ConnectedAxis<'a> {
         let status = settle::rest(self.client, BEFORE)?;
         if status.state == MachineState::Enabled {
             self.client.order(Body::Disable)?;
+            self.may_be_off = true;
             let due = self.client.now() + ENABLING;
             while self.client.status()?.state == MachineState::Enabled && self.client.now() < due {}
         }
         Ok(())
     }
 
-    /// Waits for rest, with the outputs on; says where the axis is.
+    /// Waits for rest, with the outputs on; says where the axis is. Outputs that somebody else has switched off stay off.
     fn enabled(&mut self) -> Result<f64, ClientError> {
         let mut status = settle::rest(self.client, BEFORE)?;
+        if status.state == MachineState::Disabled && !self.may_be_off {
+            return Err(SWITCHED_OFF);
+        }
         if status.state != MachineState::Enabled {
             self.client.order(Body::Enable)?;
             let due = self.client.now() + ENABLING;
@@ -244,6 +265,7 @@ impl<'a> ConnectedAxis<'a> {
                 status = self.client.status()?;
             }
         }
+        self.may_be_off = false;
         Ok(status.axes[self.axis as usize].position_mm - self.origin_mm)
     }
 }
