@@ -154,13 +154,12 @@ impl Release {
     /// Packs a folder of the release's, and removes it. The same content gives the same bytes.
     fn pack(&self, name: &str) -> Result<PathBuf> {
         let path = self.out.join(format!("{name}.tar.gz"));
-        let seconds = command::output(command::command("git").args(["log", "-1", "--format=%ct"]))?;
         command::run_quietly(
             command::command("tar")
                 .current_dir(&self.out)
                 .args(["--create", "--sort=name", "--owner=0", "--group=0"])
                 .args(["--numeric-owner", "--use-compress-program=gzip -n"])
-                .arg(format!("--mtime=@{}", seconds.trim()))
+                .arg(format!("--mtime=@{}", committed_s()?))
                 .arg("--file")
                 .arg(&path)
                 .arg(name),
@@ -190,20 +189,61 @@ impl Release {
         self.made("whl")
     }
 
-    /// Builds LinuxCNC's components, and packs them with the manual page and the configurations.
+    /// Builds LinuxCNC's components as a Debian package, with the manual page and the configurations.
     fn linuxcnc(&self) -> Result<Vec<PathBuf>> {
-        let packed = format!("quadrant-{}-linuxcnc-x86_64", self.version);
-        let folder = self.out.join(&packed);
-        fs::create_dir_all(&folder)?;
-        let built = command::run(chore(&["linuxcnc", "--build"]).arg(&folder));
-        if built.is_err() {
-            fs::remove_dir_all(&folder)?;
+        let folder = tempfile::tempdir()?;
+        let built = folder.path().join("built");
+        fs::create_dir(&built)?;
+        command::run(chore(&["linuxcnc", "--build"]).arg(&built))?;
+        let root = folder.path().join("root");
+        let mut install = |from: &Path, to: &str| -> Result<()> {
+            command::run_quietly(
+                command::command("install")
+                    .args(["-D", "--mode=644", "--target-directory"])
+                    .arg(root.join(to))
+                    .arg(from),
+            )
+        };
+        for module in ["quadrant.so", "quadrant_plant.so"] {
+            install(&built.join(module), "usr/lib/linuxcnc/modules")?;
         }
-        built?;
+        install(&built.join("quadrant.9"), "usr/share/man/man9")?;
+        let documentation = "usr/share/doc/quadrant-linuxcnc";
         for name in LICENCES {
-            fs::copy(self.root.join(name), folder.join(name))?;
+            install(&self.root.join(name), documentation)?;
         }
-        Ok(vec![self.pack(&packed)?])
+        command::run_quietly(
+            command::command("cp")
+                .arg("--recursive")
+                .arg(built.join("configs"))
+                .arg(root.join(documentation)),
+        )?;
+        fs::create_dir(root.join("DEBIAN"))?;
+        fs::write(root.join("DEBIAN/control"), self.control())?;
+        let path = self
+            .out
+            .join(format!("quadrant-linuxcnc_{}_amd64.deb", self.version));
+        command::run_quietly(
+            command::command("dpkg-deb")
+                .args(["--build", "--root-owner-group"])
+                .arg(&root)
+                .arg(&path)
+                // So that the same content gives the same bytes.
+                .env("SOURCE_DATE_EPOCH", committed_s()?),
+        )?;
+        Ok(vec![path])
+    }
+
+    /// Debian's description of the package: LinuxCNC 2.9 alone has the interface that the components were built for.
+    fn control(&self) -> String {
+        format!(
+            "Package: quadrant-linuxcnc\nVersion: {}\nArchitecture: amd64\nSection: misc\nPriority: optional\n\
+             Maintainer: The Quadrant authors <noreply@quadrant.invalid>\n\
+             Depends: linuxcnc-uspace (>= 2.9.0~), linuxcnc-uspace (<< 1:2.10)\n\
+             Description: Servo control law with friction feedforward for LinuxCNC\n \
+             The realtime components quadrant and quadrant_plant, and configurations.\n",
+            self.version
+        )
     }
 
     /// Builds the bench's page.
@@ -257,6 +297,12 @@ fn chore(arguments: &[&str]) -> Command {
     let mut cargo = command::command("cargo");
     cargo.arg("xtask").args(arguments);
     cargo
+}
+
+/// Time of the last commit, seconds since 1970.
+fn committed_s() -> Result<String> {
+    let seconds = command::output(command::command("git").args(["log", "-1", "--format=%ct"]))?;
+    Ok(seconds.trim().to_owned())
 }
 
 /// True if the standard library of a target is installed.
