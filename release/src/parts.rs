@@ -196,7 +196,7 @@ impl Release {
         fs::create_dir(&built)?;
         command::run(chore(&["linuxcnc", "--build"]).arg(&built))?;
         let root = folder.path().join("root");
-        let mut install = |from: &Path, to: &str| -> Result<()> {
+        let install = |from: &Path, to: &str| -> Result<()> {
             command::run_quietly(
                 command::command("install")
                     .args(["-D", "--mode=644", "--target-directory"])
