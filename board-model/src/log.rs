@@ -10,9 +10,16 @@ use rigless::soc::Width;
 /// True if lines are printed as they come.
 pub static SHOWN: AtomicBool = AtomicBool::new(false);
 
+/// Mode in which a probe reads the log.
+const READ_BY_PROBE: u64 = 2;
+/// The firmware's own mode.
+const TRIMS: u64 = 1;
+
 /// The log so far.
 pub struct Log {
     block: Option<u64>,
+    /// A probe reads the log.
+    pub is_read: bool,
     decoder: Box<dyn StreamDecoder + Send>,
     /// Lines, each with its virtual time.
     pub lines: Vec<String>,
@@ -35,6 +42,7 @@ impl Log {
         let table: &'static Table = Box::leak(Box::new(table.ok_or("the image has no log")?));
         Ok(Self {
             block,
+            is_read: true,
             decoder: table.new_stream_decoder(),
             lines: Vec::new(),
         })
@@ -51,6 +59,15 @@ impl Log {
             return;
         }
         let up = block + 24;
+        let mode = if self.is_read { READ_BY_PROBE } else { TRIMS };
+        if word(up + 20) != mode {
+            // Its place is in RAM, as that of all that follows.
+            let _ = host.write(up + 20, Width::W32, mode);
+        }
+        if !self.is_read {
+            return;
+        }
+        let mut word = |address: u64| host.read(address, Width::W32).unwrap_or(0);
         let (buffer, size, write, mut read) =
             (word(up + 4), word(up + 8), word(up + 12), word(up + 16));
         if write >= size || read >= size {
@@ -64,7 +81,12 @@ impl Log {
         if bytes.is_empty() || host.write(up + 16, Width::W32, read).is_err() {
             return;
         }
-        self.decoder.received(&bytes);
+        self.decode(&bytes, now);
+    }
+
+    /// Decodes frames, or parts of them, into lines.
+    pub fn decode(&mut self, bytes: &[u8], now: u64) {
+        self.decoder.received(bytes);
         loop {
             match self.decoder.decode() {
                 Ok(frame) => {

@@ -28,6 +28,7 @@ pub mod glitch_monitor;
 mod host_need;
 mod intake;
 mod liveness;
+pub mod log_ring;
 pub mod oscillation_report;
 mod queues;
 pub mod rate_limiter;

@@ -8,6 +8,7 @@
 //!   the reference board `switches`, `serial`, `watchdog`, `flash` and `reset_cause`: the traits are in
 //!   `quadrant::hal`;
 //! - `RATES_HZ`, the control rates that the board is up to;
+//! - `TAKE_LOG`, which takes bytes out of the log's buffer for the link;
 //! - `job`, what a host has left to run, if there is one;
 //! - `outputs_off`, which makes the machine safe from any context without owning anything;
 //! - `halt`, which never returns;

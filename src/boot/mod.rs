@@ -100,6 +100,7 @@ pub(crate) fn machine<S: Scalar>(
         cycle_hz,
         rates_hz: board::RATES_HZ,
         number,
+        log: board::TAKE_LOG,
     };
     Machine {
         control,

@@ -16,6 +16,7 @@ mod glitch_monitor;
 mod host_requests;
 mod injection_over_link;
 mod link_words;
+mod log_over_link;
 mod operation;
 mod oscillation_report;
 mod preemption;

@@ -7,6 +7,7 @@ mod faults;
 mod flood;
 mod inputs;
 mod jog;
+mod link_log;
 mod model;
 mod start;
 mod store;
@@ -55,6 +56,7 @@ pub const SCENARIOS: &[Scenario] = scenarios! {
     "inputs", "each safety input of a moving machine", inputs::run;
     "converter", "converter lost in mid-frame", converter::run;
     "flood", "noise and requests without a pause on the link", flood::run;
+    "link-log", "the log over the link, while no probe reads it", link_log::run;
     "clock", "8 MHz missing at the start, and lost in motion", clock::run;
     "words", "every converter word of 10 s of motion beside the reference model's", words::run;
 };

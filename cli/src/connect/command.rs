@@ -6,6 +6,7 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand, ValueEnum};
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::Output;
+use quadrant_host::log::LogFilter;
 use quadrant_host::machine::simulated_io;
 use quadrant_link::message::Channel;
 use quadrant_tune::test_axis::Travel;
@@ -166,8 +167,8 @@ pub(super) enum Command {
         #[arg(default_value_t = 0.0)]
         seconds: f64,
     },
-    /// Show the firmware's log (defmt): of the emulated board what has come since the last time; of a board, with --elf and
-    /// without a connection, through its debug probe until Ctrl-C.
+    /// Show what the firmware has logged (defmt) since the last time: over the link, where --elf has its strings, or of the emulated
+    /// board. Without a connection: of a file, or through a debug probe until Ctrl-C.
     Log(LogOptions),
     /// Press inputs of a simulated or emulated machine, until `release`.
     Press {
@@ -472,6 +473,50 @@ pub(super) struct LogOptions {
     /// The chip, as probe-rs calls it.
     #[arg(long, default_value = "STM32F446RETx", requires = "elf")]
     pub(super) chip: String,
+    /// Frames that were captured elsewhere, instead of those of a machine.
+    #[arg(
+        long,
+        value_name = "FRAMES",
+        requires = "elf",
+        conflicts_with = "follow"
+    )]
+    pub(super) file: Option<PathBuf>,
+    /// Go on until Ctrl-C.
+    #[arg(long)]
+    pub(super) follow: bool,
+    /// The least level.
+    #[arg(long, value_enum, default_value_t = LogLevel::Trace)]
+    level: LogLevel,
+    /// Lines that name this axis only.
+    #[arg(long)]
+    axis: Option<Axis>,
+    /// Lines from this control tick on.
+    #[arg(long, value_name = "TICK")]
+    from: Option<u32>,
+    /// Lines up to this control tick.
+    #[arg(long, value_name = "TICK")]
+    to: Option<u32>,
+}
+
+/// Level of a line, the least first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum LogLevel {
+    Trace,
+    Debug,
+    Info,
+    Warn,
+    Error,
+}
+
+impl LogOptions {
+    /// The choice of lines.
+    pub(super) fn filter(&self) -> LogFilter {
+        LogFilter {
+            level: self.level as usize,
+            word: self.axis.map(|axis| axis.name().to_owned()),
+            ticks: (self.from, self.to),
+        }
+    }
 }
 
 /// Reads the name of an input that can be pressed.

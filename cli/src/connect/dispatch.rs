@@ -8,8 +8,8 @@ use super::command::{Command, RecordOptions};
 use super::line::{self, Said};
 use super::session::Session;
 use super::{
-    commission, identify, inputs, learnt, machine, observe, program, scope, settings, simulated_io,
-    watch,
+    commission, firmware_log, identify, inputs, learnt, machine, observe, program, scope, settings,
+    simulated_io, watch,
 };
 
 /// Gives a command and prints its result; returns true if it succeeded. `source` is its line, for messages.
@@ -79,7 +79,7 @@ fn answer(session: &mut Session, command: &Command) -> anyhow::Result<Answer> {
         Command::Scope(options) => scope::run(session, options),
         Command::Watch(options) => watch::run(&mut session.client, options),
         Command::Events { seconds } => observe::events(session, *seconds),
-        Command::Log(options) => simulated_io::log(session, options),
+        Command::Log(options) => firmware_log::run(session, options),
         Command::Press { inputs } => simulated_io::press(session, inputs),
         Command::Release { inputs } => simulated_io::release(session, inputs),
         Command::PowerCycle => simulated_io::power_cycle(client),

@@ -5,6 +5,7 @@ mod command;
 mod commission;
 mod completion;
 mod dispatch;
+mod firmware_log;
 mod flash;
 mod help;
 mod identify;
@@ -98,6 +99,17 @@ struct MachineOptions {
     emulated: Option<PathBuf>,
 }
 
+impl MachineOptions {
+    /// True if none is named.
+    const fn is_nowhere(&self) -> bool {
+        self.port.is_none()
+            && self.tcp.is_none()
+            && self.look.is_none()
+            && self.simulated.is_none()
+            && self.emulated.is_none()
+    }
+}
+
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(Command::Flash(flash)) = &arguments.command {
         return flash::run(flash);
@@ -105,7 +117,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(Command::Log(log)) = &arguments.command
         && let Some(elf) = &log.elf
     {
-        return flash::log(elf, log);
+        if let Some(frames) = &log.file {
+            return firmware_log::file(elf, frames, &log.filter());
+        }
+        if arguments.machine.is_nowhere() {
+            return flash::log(elf, log);
+        }
     }
     let printer = Printer {
         json: arguments.json,

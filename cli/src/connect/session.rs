@@ -2,6 +2,7 @@
 
 use quadrant_host::client::Client;
 use quadrant_host::client::settings::Before;
+use quadrant_host::log::LogDecoder;
 use quadrant_law::safety::Switches;
 
 use super::printer::Printer;
@@ -16,6 +17,8 @@ pub(super) struct Session {
     pub(super) undo: Vec<Before>,
     /// The origin of the settings that act, as far as this session knows it.
     pub(super) origin: Origin,
+    /// Decoder of the board's log, once an image was given.
+    pub(super) log: Option<LogDecoder>,
 }
 
 /// The origin of the settings that act.
@@ -35,6 +38,7 @@ impl Session {
             pressed: Switches::NONE,
             undo: Vec::new(),
             origin: Origin::default(),
+            log: None,
         }
     }
 

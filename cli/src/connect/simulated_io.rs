@@ -7,7 +7,6 @@ use quadrant_law::safety::Switches;
 use serde_json::json;
 
 use super::answer::{Answer, RESTARTED};
-use super::command::LogOptions;
 use super::session::Session;
 
 pub(super) fn press(session: &mut Session, names: &[String]) -> anyhow::Result<Answer> {
@@ -55,31 +54,6 @@ pub(super) fn power_cycle(client: &mut Client) -> anyhow::Result<Answer> {
         .context("power-cycle")?;
     client.restarted()?;
     Ok(Answer::new(RESTARTED, json!("done")))
-}
-
-/// Prints the lines that the firmware has logged since the last call.
-pub(super) fn log(session: &mut Session, options: &LogOptions) -> anyhow::Result<Answer> {
-    if options.elf.is_some() {
-        bail!("log --elf: this is for the shell, and needs no connection");
-    }
-    let endpoint = session.client.endpoint();
-    let Some(io) = session.client.simulated_io() else {
-        bail!(
-            "log: the firmware's log comes through the debug probe, not from {endpoint}: `quadrant connect log --elf FILE`; \
-             `events` shows what the link reports"
-        );
-    };
-    let Some(lines) = io.log().context("log")? else {
-        bail!(
-            "log: {endpoint} runs without the firmware that logs; `events` shows what the link reports"
-        );
-    };
-    for line in &lines {
-        session
-            .printer
-            .result("log", line, &json!({ "line": line }));
-    }
-    Ok(Answer::new("", json!({ "lines": lines.len() })))
 }
 
 fn simulated_io<'a>(client: &'a mut Client, what: &str) -> anyhow::Result<&'a mut dyn SimulatedIo> {

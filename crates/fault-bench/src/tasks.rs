@@ -279,6 +279,27 @@ pub struct Tasks {
     pub held_up: u32,
 }
 
+thread_local! {
+    /// The log of the board of this thread's tasks.
+    static LOG: RefCell<VecDeque<u8>> = const { RefCell::new(VecDeque::new()) };
+}
+
+/// Adds bytes to the board's log.
+pub fn write_log(bytes: &[u8]) {
+    LOG.with_borrow_mut(|log| log.extend(bytes));
+}
+
+/// Takes bytes of the log that a host has asked for.
+fn take_log(bytes: &mut [u8], asked: bool) -> usize {
+    LOG.with_borrow_mut(|log| {
+        let count = if asked { bytes.len().min(log.len()) } else { 0 };
+        for (place, byte) in bytes.iter_mut().zip(log.drain(..count)) {
+            *place = byte;
+        }
+        count
+    })
+}
+
 impl Tasks {
     pub fn new(settings: &StageSettings, seed: u64) -> Self {
         Self::with_flash(settings, seed, Flash::default(), None)
@@ -343,6 +364,7 @@ impl Tasks {
             cycle_hz: 0,
             rates_hz: (2.5e3, 1.5e4),
             number: NumberType::F32,
+            log: Some(take_log),
         });
         let mut tasks = Self {
             upper,

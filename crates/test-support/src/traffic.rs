@@ -186,7 +186,7 @@ impl Requests<'_> {
 
     /// Any request, all its numbers finite.
     fn body(&mut self) -> Body {
-        match self.below(21) {
+        match self.below(22) {
             0 => Body::Hello,
             1 => Body::Status,
             2 => Body::Fault,
@@ -222,6 +222,9 @@ impl Requests<'_> {
             17 => Body::Inputs,
             18 => Body::Learning,
             19 => Body::Spindle { rpm: self.real() },
+            20 => Body::Log {
+                from: self.bits() as u32,
+            },
             _ => Body::Reboot,
         }
     }

@@ -31,6 +31,7 @@ use self::recorder::Recorder;
 use self::transmit_buffer::TransmitBuffer;
 use super::queues::ServerEnds;
 use super::{Axis, Snapshot, TimingStatistics};
+use crate::app::log_ring::{LogRing, TakeLog};
 use crate::app::telemetry::Packer;
 use crate::hal::{Serial, SettingsFlash};
 use crate::store::{BUFFER_BYTES, Store};
@@ -39,8 +40,8 @@ use quadrant_law::axes::{AxisName, PerAxis};
 use quadrant_law::scalar::Scalar;
 use quadrant_link::frame::FrameCounters;
 use quadrant_link::message::{
-    AxisSet, Body, Event, LinkError, Message, Notice, NumberType, Provenance, Reply,
-    SettingsRequest, text,
+    AxisSet, Body, Event, LOG_PAGE_BYTES, LinkError, LogPage, Message, Notice, NumberType,
+    Provenance, Reply, SettingsRequest, text,
 };
 use quadrant_link::server::LinkServer;
 use quadrant_settings::StageSettings;
@@ -52,6 +53,10 @@ pub use self::statistics::ServerStatistics;
 const MESSAGES_PER_POLL: usize = 4;
 /// Events that wait for the host.
 const EVENT_ROOM: usize = 8;
+/// Bytes of the log that are taken at a time.
+const LOG_BYTES: usize = 128;
+/// Pieces of the log that are taken at once: more than the reference board's buffer of 1 KiB holds.
+const LOG_PIECES: usize = 10;
 
 /// The parts of a server.
 pub struct ServerParts<'q, 'a, S: Scalar, F> {
@@ -82,6 +87,8 @@ pub struct ServerParts<'q, 'a, S: Scalar, F> {
     pub rates_hz: (f64, f64),
     /// The number type of the control law.
     pub number: NumberType,
+    /// The way to the board's log; none if the link cannot show it.
+    pub log: Option<TakeLog>,
 }
 
 /// The result of a poll.
@@ -132,6 +139,8 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     cycle_hz: u32,
     rates_hz: (f64, f64),
     number: NumberType,
+    take_log: Option<TakeLog>,
+    log: LogRing,
     reboot: bool,
     /// Orders sent to control so far; wraps.
     orders: u16,
@@ -187,6 +196,8 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
             cycle_hz: parts.cycle_hz,
             rates_hz: parts.rates_hz,
             number: parts.number,
+            take_log: parts.log,
+            log: LogRing::new(),
             reboot: false,
             orders: 0,
             exchanges: 0,
@@ -216,6 +227,7 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
         seen: &Snapshot<S>,
         timing: TimingStatistics,
     ) -> Poll {
+        self.keep_log(false);
         self.report_homed(seen);
         self.seen = *seen;
         self.timing = timing;
@@ -242,6 +254,39 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
         }
         self.transmit.flush(serial);
         Poll::Continue
+    }
+
+    /// Takes what the board's log has, and returns whether it has one.
+    fn keep_log(&mut self, asked: bool) -> bool {
+        let Some(take) = self.take_log else {
+            return false;
+        };
+        for _ in 0..LOG_PIECES {
+            let mut bytes = [0; LOG_BYTES];
+            let count = take(&mut bytes, asked);
+            self.log.push(bytes.get(..count).unwrap_or(&[]));
+            if count == 0 {
+                break;
+            }
+        }
+        true
+    }
+
+    /// A page of the log.
+    #[inline(never)]
+    fn log(&mut self, from: u32) -> Result<Reply, LinkError> {
+        if !self.keep_log(true) {
+            return Err(LinkError::Unsupported(text(format_args!(
+                "this board sends no log over the link"
+            ))));
+        }
+        let mut page = LogPage::default();
+        // Cannot fail: that is its capacity.
+        let _ = page.bytes.resize_default(LOG_PAGE_BYTES);
+        let (first, count) = self.log.read(from, &mut page.bytes);
+        page.from = first;
+        page.bytes.truncate(count);
+        Ok(Reply::Log(page))
     }
 
     /// Reports the axes that were homed since the last poll.
@@ -339,6 +384,7 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
             Body::Fault => Ok(Reply::Fault(self.fault())),
             Body::Inputs => Ok(Reply::Inputs(self.inputs())),
             Body::Learning => Ok(Reply::Learning(self.learning())),
+            Body::Log { from } => self.log(from),
             Body::Stream(request) => self.serve_stream(request),
             Body::Inject(request) => self.serve_inject(request),
             Body::Settings(request) => self.serve_settings(request),

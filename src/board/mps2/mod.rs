@@ -19,6 +19,7 @@ use cortex_m::peripheral::NVIC;
 use cortex_m_semihosting::debug;
 use defmt_semihosting as _;
 
+use quadrant::app::log_ring::TakeLog;
 use quadrant::drivers::tick_interval::TickInterval;
 use quadrant::hal::{self, ResetCause};
 use quadrant_law::command::Command;
@@ -72,6 +73,9 @@ pub(crate) struct Board {
 
 /// Control rates, Hz: all that settings allow.
 pub(crate) const RATES_HZ: (f64, f64) = (1e3, 1e5);
+
+/// The log goes to the emulator, and is not on the link.
+pub(crate) const TAKE_LOG: Option<TakeLog> = None;
 
 /// The board's name.
 pub(crate) const NAME: &str = "mps2";

@@ -37,6 +37,7 @@ mod dma_memory;
 mod encoders;
 mod flash;
 mod pins;
+mod rtt;
 mod serial;
 mod switches;
 mod tick;
@@ -57,6 +58,7 @@ pub(crate) use self::switches::Switches;
 pub(crate) use self::tick::Tick;
 use self::watchdog::Supply;
 pub(crate) use self::watchdog::Watchdog;
+use quadrant::app::log_ring::TakeLog;
 use quadrant::drivers::hold_button::HoldButton;
 use quadrant::hal::ResetCause;
 use quadrant_law::command::Command;
@@ -182,6 +184,9 @@ impl Board {
 /// Control rates, Hz: slower, the supervising task would feed the watchdog too late, which may bite after 6.8 ms; faster,
 /// the tick leaves too little to the other tasks.
 pub(crate) const RATES_HZ: (f64, f64) = (2.5e3, 1.5e4);
+
+/// Takes bytes of the log out of its buffer.
+pub(crate) const TAKE_LOG: Option<TakeLog> = Some(rtt::take);
 
 /// The board's name.
 pub(crate) const NAME: &str = "nucleo-f446re";

@@ -8,8 +8,8 @@ use quadrant::app::Translated;
 use quadrant_law::safety::FaultCode;
 use quadrant_link::frame::{self, DELIMITER, DecodeError, FRAME_BYTES, Receiver};
 use quadrant_link::message::{
-    AxisName, Body, Event, FaultReport, Identity, Inputs, Learning, LinkError, Message, Notice,
-    Reply, Request, SettingsRequest, Status,
+    AxisName, Body, Event, FaultReport, Identity, Inputs, Learning, LinkError, LogPage, Message,
+    Notice, Reply, Request, SettingsRequest, Status,
 };
 use quadrant_link::message::{MachineState, TelemetryBlock};
 
@@ -230,6 +230,17 @@ impl Client {
         match self.request(Body::Learning)? {
             Reply::Learning(learning) => Ok(learning),
             other => Err(self.unexpected("learning", &other)),
+        }
+    }
+
+    /// A page of the log, from the byte of this number on.
+    ///
+    /// # Errors
+    /// A board without one; or as [`request`](Self::request).
+    pub fn log(&mut self, from: u32) -> Result<LogPage, ClientError> {
+        match self.request(Body::Log { from })? {
+            Reply::Log(page) => Ok(page),
+            other => Err(self.unexpected("log", &other)),
         }
     }
 
@@ -669,5 +680,6 @@ const fn reply_name(reply: &Reply) -> &'static str {
         Reply::Inject(_) => "the state of an injection",
         Reply::Inputs(_) => "the digital inputs",
         Reply::Learning(_) => "what was learnt",
+        Reply::Log(_) => "a page of the log",
     }
 }

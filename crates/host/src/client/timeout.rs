@@ -47,6 +47,7 @@ pub(super) const fn idempotency(body: &Body) -> Idempotency {
         | Body::Fault
         | Body::Inputs
         | Body::Learning
+        | Body::Log { .. }
         | Body::Settings(
             SettingsRequest::Get(_)
             | SettingsRequest::GetInForce(_)

@@ -144,6 +144,7 @@ pub fn start_halves<S: Scalar>(
             cycle_hz: identity.cycle_hz,
             rates_hz: RATES_HZ,
             number: identity.number,
+            log: None,
         }),
         requests: VecDeque::new(),
         commands: VecDeque::new(),

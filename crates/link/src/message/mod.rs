@@ -33,8 +33,8 @@ pub use motion::{
 };
 pub use notice::{Event, Notice, OscillationKind};
 pub use observe::{
-    BLOCK_BYTES, BLOCK_WORDS, CaptureRequest, CaptureStatus, MAX_CHANNELS, SERIAL_VALUES_PER_S,
-    SampleWords, TelemetryBlock, TelemetryRequest, WordPage,
+    BLOCK_BYTES, BLOCK_WORDS, CaptureRequest, CaptureStatus, LOG_PAGE_BYTES, LogPage, MAX_CHANNELS,
+    SERIAL_VALUES_PER_S, SampleWords, TelemetryBlock, TelemetryRequest, WordPage,
 };
 pub use settings::{
     Applied, MAX_VALUE_BYTES, PAGE_PATHS, Path, PathPage, Provenance, SettingsRequest, Value,
@@ -115,6 +115,11 @@ pub enum Body {
     Spindle {
         /// The speed, rpm, 0 to 1 000 000; zero if it stands.
         rpm: f64,
+    },
+    /// Asks for bytes of the log. [`Reply::Log`].
+    Log {
+        /// Number of the first byte, counted since the start; wraps.
+        from: u32,
     },
 }
 
@@ -246,4 +251,6 @@ pub enum Reply {
     Inputs(Inputs),
     /// The result of learning.
     Learning(Learning),
+    /// A page of the log.
+    Log(LogPage),
 }

@@ -18,6 +18,18 @@ pub const BLOCK_BYTES: usize = 4 * BLOCK_WORDS;
 /// Values a second that a serial port carries in blocks: `docs/link.md`, Telemetry.
 pub const SERIAL_VALUES_PER_S: f64 = 21_500.0;
 
+/// Bytes of the log in a page at most.
+pub const LOG_PAGE_BYTES: usize = 256;
+
+/// Bytes of the log, as defmt encodes it: the firmware's image has its strings.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LogPage {
+    /// Number of the first byte since the start, wrapping: later than was asked for by what is lost.
+    pub from: u32,
+    /// The bytes; none if there are no newer ones.
+    pub bytes: Vec<u8, LOG_PAGE_BYTES>,
+}
+
 /// Words of samples, little-endian, four bytes each.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SampleWords(Vec<u8, BLOCK_BYTES>);

@@ -60,6 +60,7 @@ fn requests() -> Vec<(Body, &'static str)> {
         (Body::Inputs, "12"),
         (Body::Learning, "13"),
         (Body::Spindle { rpm: 3000.0 }, "14000000000070a740"),
+        (Body::Log { from: 300 }, "15ac02"),
         (Body::ResetFault, "03"),
         (Body::Enable, "04"),
         (Body::Disable, "05"),

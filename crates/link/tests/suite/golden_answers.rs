@@ -168,6 +168,13 @@ fn replies() -> Vec<(Result<Reply, LinkError>, &'static str)> {
             "0eac0201050000c03f\
              0000803f010000803e0000",
         ),
+        (
+            Ok(Reply::Log(LogPage {
+                from: 300,
+                bytes: heapless::Vec::from_slice(&[7, 0]).unwrap(),
+            })),
+            "0fac02020700",
+        ),
         (Err(LinkError::Version { yours: 9, mine: 1 }), "000901"),
         (Err(LinkError::Undecodable), "01"),
         (Err(LinkError::NoHello), "02"),

@@ -1,4 +1,4 @@
-//! The firmware's log: defmt frames, decoded with the strings in the image.
+//! The emulated firmware's log.
 //!
 //! QEMU writes them to a file, not a pipe: so they can be read at any time without waiting, and all that the firmware has
 //! written is there.
@@ -8,10 +8,11 @@ use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::sync::Arc;
 
-use defmt_decoder::{DecodeError, Table};
+use defmt_decoder::Table;
 
 use super::error::EmulatorError;
 use super::memory;
+use crate::log::decode;
 
 /// Byte that ends a frame.
 const DELIMITER: u8 = 0;
@@ -61,20 +62,6 @@ impl Log {
         let rest = self.begun.split_off(last + 1);
         let whole = std::mem::replace(&mut self.begun, rest);
         Ok(decode(&self.table, &whole))
-    }
-}
-
-/// The lines in whole frames.
-pub(super) fn decode(table: &Table, frames: &[u8]) -> Vec<String> {
-    let mut decoder = table.new_stream_decoder();
-    decoder.received(frames);
-    let mut lines = Vec::new();
-    loop {
-        match decoder.decode() {
-            Ok(frame) => lines.push(frame.display(false).to_string()),
-            Err(DecodeError::Malformed) => lines.push("(a damaged line)".to_owned()),
-            Err(DecodeError::UnexpectedEof) => return lines,
-        }
     }
 }
 

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use defmt_decoder::{Encoding, Table};
+use defmt_decoder::Table;
 use object::read::elf::FileHeader;
 use object::{Endianness, elf};
 
 use super::error::EmulatorError;
-use super::log;
+use crate::log;
 
 /// A linked image, read.
 #[derive(Clone)]
@@ -42,12 +42,7 @@ impl Program {
             return Err(no_image("it is not for an Arm processor".to_owned()));
         }
         let hard_float = header.e_flags(endian) & elf::EF_ARM_ABI_FLOAT_HARD != 0;
-        let table = Table::parse(&elf)
-            .map_err(|error| no_image(format!("its log strings do not parse: {error}")))?
-            .ok_or_else(|| no_image("it has no log strings".to_owned()))?;
-        if table.encoding() != Encoding::Rzcobs {
-            return Err(no_image("its log is not in frames".to_owned()));
-        }
+        let table = log::table(&elf).map_err(no_image)?;
         Ok(Self {
             path: path.to_owned(),
             table: Arc::new(table),

@@ -62,6 +62,9 @@ impl Model {
                     captured: false,
                 })));
             }
+            Body::Log { .. } => {
+                return Err(LinkError::Unsupported(text(format_args!("no log"))));
+            }
             // Nothing of the model turns.
             Body::Spindle { .. } => {}
             Body::ResetFault => self.fault = None,
