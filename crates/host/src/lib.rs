@@ -3,7 +3,7 @@
 //! - [`machine`]: the control law alone, the firmware's application in this process, its image in QEMU, a board: one
 //!   interface to measure them all;
 //! - [`client`]: a session with a machine over the link;
-//! - `log` (feature `log`): the firmware's log, decoded.
+//! - [`log`](mod@log) (feature `log`): the firmware's log, decoded.
 //!
 //! It knows no pages and no command line.
 #![forbid(unsafe_code)]
