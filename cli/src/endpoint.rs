@@ -141,6 +141,14 @@ impl LinkEndpoint {
         share: Option<&str>,
     ) -> anyhow::Result<Client> {
         let client = self.open(simulation, flash, share)?;
+        let firmware = client.identity().firmware.as_str();
+        if firmware != env!("CARGO_PKG_VERSION") {
+            warn!(
+                "the firmware of {} is version {firmware}, this program {}: what one of them does not know, it refuses; use those of one release",
+                client.endpoint(),
+                env!("CARGO_PKG_VERSION")
+            );
+        }
         stop_on_signals(client.interrupt())?;
         terminal::keep_modes();
         Ok(client)

@@ -107,6 +107,8 @@ fn texts_of_a_board_do_not_act_on_the_terminal() {
             serde_json::from_str::<serde_json::Value>(line).unwrap();
         }
         assert_plain(&output);
+        let warned = String::from_utf8_lossy(&output.stderr);
+        assert!(warned.contains("use those of one release"), "{warned}");
     }
 }
 
