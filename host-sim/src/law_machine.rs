@@ -191,7 +191,7 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
     }
 
     fn supervise(&mut self) {
-        let view = self.stage.as_ref().view(&self.state);
+        let view = self.stage.as_ref().view(&self.plan, &self.state);
         let decision = self.supervisor.step(view, self.requests.pop_front());
         self.command = decision.command;
         let tick = self.state.tick();
