@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use quadrant_law::admission::Refusal;
 use quadrant_law::axes::{AxisName, PerAxis};
 use quadrant_law::cancelling::SpindleSpeed;
 use quadrant_law::command::Command;
@@ -110,6 +111,15 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
     /// Returns the events of the supervisor, each with its control tick.
     pub fn events(&self) -> &[(u32, Event)] {
         &self.events
+    }
+
+    /// The last request that was refused, by its reason.
+    pub fn refusal(&self) -> Option<Refusal> {
+        let refused = |(_, event): &(u32, Event)| match event {
+            Event::Refused(_, refusal) => Some(*refusal),
+            _ => None,
+        };
+        self.events.iter().rev().find_map(refused)
     }
 
     /// Gives an axis of the plan another motion, for [`Command::StartMove`]. It must not be following the plan.

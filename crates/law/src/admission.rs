@@ -36,6 +36,8 @@ pub struct StageView {
     ///
     /// [`StageRef::is_commissioned`]: crate::stage::StageRef::is_commissioned
     pub commissioned: bool,
+    /// The first axis that has a law and was not commissioned.
+    pub uncommissioned: Option<AxisName>,
     /// The axes that nobody has commissioned and that have no law: they do not move.
     pub inert: PerAxis<bool>,
     /// The first inert axis that the plan would move.
@@ -79,8 +81,10 @@ pub enum Refusal {
     NoInjection,
     /// A voltage is being injected.
     Injecting,
-    /// No axis is commissioned, or one that has a law is not.
+    /// No axis is commissioned.
     NotCommissioned,
+    /// The axis has a law and is not commissioned.
+    LawNotCommissioned(AxisName),
     /// The axis has no law that could move it.
     NoLaw(AxisName),
     /// The holding brake is being released or applied.
@@ -117,7 +121,10 @@ impl Refusal {
             }
             Self::Injecting => "a voltage is being injected; stop it or wait until it ends",
             Self::NotCommissioned => {
-                "not commissioned: no axis is, or this one is not, or one with a law is not; run `quadrant commission`, or load a settings file with `commissioned = true`"
+                "not commissioned: no axis is; run `quadrant commission`, or load a settings file with `commissioned = true`"
+            }
+            Self::LawNotCommissioned(_) => {
+                "the axis has a law, but is not commissioned: commission it, or load settings in which it has none"
             }
             Self::NoLaw(_) => {
                 "the axis has no law and cannot move: commission it, or leave it out of the motion"
@@ -162,6 +169,7 @@ impl Refusal {
             Self::AxisBusy(axis)
             | Self::NotAtStandstill(axis)
             | Self::NotHomed(axis)
+            | Self::LawNotCommissioned(axis)
             | Self::NoLaw(axis) => Some(*axis),
             _ => None,
         }
@@ -209,7 +217,10 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
         }
         Command::Enable if view.safety == SafetyState::Start => Some(Refusal::Starting),
         Command::Enable if view.settings_invalid => Some(Refusal::SettingsInvalid),
-        Command::Enable if !view.commissioned => Some(Refusal::NotCommissioned),
+        Command::Enable if !view.commissioned => Some(match view.uncommissioned {
+            Some(axis) => Refusal::LawNotCommissioned(axis),
+            None => Refusal::NotCommissioned,
+        }),
         Command::Enable if view.locked => Some(Refusal::Locked),
         Command::Enable if !view.safety.is_enabled() && view.moving.is_some() => {
             view.moving.map(Refusal::NotAtStandstill)

@@ -306,6 +306,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             injection_ready: state.is_injection_ready() && self.may_inject(state),
             injecting: state.is_injecting(),
             commissioned: self.is_commissioned(),
+            uncommissioned: self.uncommissioned(),
             inert,
             inert_planned: planned,
             inert_streamed: first(state.axes.by_ref().map(AxisState::is_streamed_away)),
@@ -337,12 +338,16 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
     /// True if an axis was commissioned, and no other has a law that could drive it.
     #[inline(always)]
     pub fn is_commissioned(&self) -> bool {
-        let has = |standing| {
-            self.axes
-                .iter()
-                .any(|axis| axis.commissioning() == standing)
-        };
-        has(Commissioning::Done) && !has(Commissioning::Missing)
+        let mut axes = self.axes.iter();
+        axes.any(|axis| axis.commissioning() == Commissioning::Done)
+            && self.uncommissioned().is_none()
+    }
+
+    /// The first axis that has a law and was not commissioned.
+    #[inline(always)]
+    fn uncommissioned(&self) -> Option<AxisName> {
+        let mut axes = AxisName::ALL.into_iter();
+        axes.find(|&name| self.axes[name].commissioning() == Commissioning::Missing)
     }
 }
 

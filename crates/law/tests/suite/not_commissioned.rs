@@ -29,6 +29,7 @@ const READY: StageView = StageView {
     injection_ready: false,
     injecting: false,
     commissioned: false,
+    uncommissioned: None,
     inert: PerAxis::splat(false),
     inert_planned: None,
     inert_streamed: None,
@@ -242,6 +243,10 @@ fn one_axis_with_a_law_that_was_not_commissioned_keeps_the_outputs_off() {
         drive(&mut settings.axes[2]);
         let mut rig = Rig::<f32>::new(&settings, &Default::default());
         rig.tick();
+        let view = rig.stage.as_ref().view(&rig.plan, &rig.state);
+        let named = Refusal::LawNotCommissioned(AxisName::Z);
+        assert_eq!(refusal(view, Command::Enable), Some(named));
+        assert_eq!(settings.uncommissioned(), Some(AxisName::Z));
         assert!(!rig.command(Command::Enable).enabled);
         assert!(!rig.tick().enabled);
     }

@@ -28,6 +28,7 @@ const DISABLED: StageView = StageView {
     injection_ready: false,
     injecting: false,
     commissioned: true,
+    uncommissioned: None,
     inert: PerAxis::splat(false),
     inert_planned: None,
     inert_streamed: None,
