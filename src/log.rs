@@ -72,11 +72,16 @@ pub(crate) fn settings_loaded(settings: &StageSettings, number: u32, provenance:
     );
 }
 
-/// Warns if the settings in force are the default ones, and says what to do.
+/// Warns if the settings in force are not those of a commissioned stage, and says what to do.
 pub(crate) fn not_commissioned(settings: &StageSettings) {
-    if !settings.is_commissioned() {
+    if let Some(axis) = settings.uncommissioned() {
         defmt::warn!(
-            "not commissioned: no axis is, or one with a law is not; the outputs stay off; run `quadrant commission`, or load settings and store them"
+            "{=str} has a law, but is not commissioned; the outputs stay off",
+            axis.as_str()
+        );
+    } else if !settings.is_commissioned() {
+        defmt::warn!(
+            "not commissioned: no axis is; the outputs stay off; run `quadrant commission`, or load settings and store them"
         );
     }
 }

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use quadrant_law::axes::AxisName;
 use quadrant_settings::StageSettings;
 use quadrant_sim::setting_value::{Change, changes, lost};
-use quadrant_sim::settings_file::SettingsFile;
+use quadrant_sim::settings_file::{SettingsFile, without_law};
 use quadrant_written::whole;
 
 /// Settings to start from where there are none: those of the simulated stage, no axis of which anybody has commissioned.
@@ -16,6 +16,24 @@ pub(super) fn built_in() -> SettingsFile {
         axis.commissioned = false;
     }
     SettingsFile::new(stage)
+}
+
+/// The same for a record of `axis`, of a machine that is not known: the other axes have no law.
+pub(super) fn built_in_for(axis: AxisName) -> SettingsFile {
+    let mut file = built_in();
+    for other in AxisName::ALL.into_iter().filter(|other| *other != axis) {
+        without_law(&mut file.stage.axes[other as usize], file.stage.rate_hz);
+    }
+    file
+}
+
+/// The same without any law: what is identified of an axis is no law.
+pub(super) fn without_laws() -> SettingsFile {
+    let mut file = built_in();
+    for axis in &mut file.stage.axes {
+        without_law(axis, file.stage.rate_hz);
+    }
+    file
 }
 
 /// Writes settings that have come of `start`, and returns a line for each setting that differs from those that the file held, or
@@ -29,9 +47,21 @@ pub(super) fn write(
     path: &Path,
 ) -> anyhow::Result<Vec<String>> {
     let before = SettingsFile::read(path).map(|there| there.stage);
+    make_folder(path)?;
     file.write(path, whole::write)?;
     let changed = changes(before.as_ref().unwrap_or(start), &file.stage);
     Ok(changed.iter().map(Change::to_string).collect())
+}
+
+/// Makes the folder of a file that is about to be written.
+///
+/// # Errors
+/// A folder that cannot be made.
+pub(super) fn make_folder(path: &Path) -> anyhow::Result<()> {
+    let Some(folder) = path.parent() else {
+        return Ok(());
+    };
+    std::fs::create_dir_all(folder).with_context(|| format!("{} cannot be made", folder.display()))
 }
 
 /// Refuses to write `after`, which has come of `start`, over other settings.

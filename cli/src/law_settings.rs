@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
+use anyhow::ensure;
 use clap::Args;
 use quadrant_law::axes::AxisName;
 use quadrant_sim::identified_stage::identified_settings;
-use quadrant_sim::settings_file::{SettingsFile, SettingsFileError};
+use quadrant_sim::settings_file::SettingsFile;
 
 use crate::warn;
 
@@ -23,10 +24,11 @@ impl LawSettings {
     /// with a note.
     ///
     /// # Errors
-    /// A file that cannot be read, or settings that the firmware would refuse.
-    pub fn read(&self) -> Result<SettingsFile, SettingsFileError> {
+    /// A file that cannot be read, or settings that the firmware would refuse; an axis that has a law and is not commissioned, or has
+    /// no nonlinear gain: the runs enable the outputs, and compare N-PID with PID.
+    pub fn read(&self) -> anyhow::Result<SettingsFile> {
         let Some(path) = &self.path else {
-            return identified_settings();
+            return Ok(identified_settings()?);
         };
         let mut file = SettingsFile::read(path)?;
         let mut inert = AxisName::ALL.to_vec();
@@ -34,6 +36,24 @@ impl LawSettings {
             let own = &file.stage.axes[*axis as usize];
             !own.commissioned && own.feedback.pid.kp_v_per_mm == 0.0
         });
+        let shown = path.display();
+        for axis in AxisName::ALL {
+            let own = &file.stage.axes[axis as usize];
+            if inert.contains(&axis) {
+                continue;
+            }
+            ensure!(
+                own.commissioned,
+                "{shown}: {axis} has a law, but is not commissioned: `quadrant commission --axis {axis} --settings {shown}`, or set \
+                 commissioned = true if its gains were checked"
+            );
+            ensure!(
+                own.feedback.nonlinear.is_some(),
+                "{shown}: {axis} has the law {} and no nonlinear gain, and N-PID is run beside it: `quadrant design npid --axis {axis} \
+                 --settings {shown} --into {shown}` adds one",
+                own.feedback.law.name()
+            );
+        }
         if inert.is_empty() {
             return Ok(file);
         }
@@ -42,7 +62,7 @@ impl LawSettings {
             file.stage.axes[axis as usize] = identified.stage.axes[axis as usize].clone();
             warn!(
                 "note: {axis} is not commissioned in {}: it runs under the settings that came of commissioning the simulated stage",
-                path.display()
+                shown
             );
         }
         // As if it had been read so.

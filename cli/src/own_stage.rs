@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, bail};
 use clap::Args;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, command_line, share};
@@ -88,7 +88,6 @@ pub(super) fn setup(
     if given.path.is_some() {
         let settings = given.read()?.stage;
         refuse_other_hardware(stage, axes, &settings)?;
-        refuse_uncommissioned(stage, axes, &settings)?;
         return Ok(RunConfiguration::on(settings, stage.truth.clone()).with_best_pid()?);
     }
     let bar = share("commissioning your stage");
@@ -164,22 +163,6 @@ pub(super) fn refuse_other_hardware(
                 );
             }
         }
-    }
-    Ok(())
-}
-
-/// Refuses settings under which an axis of the stage has no law.
-fn refuse_uncommissioned(
-    stage: &StageFile,
-    axes: &[AxisName],
-    settings: &StageSettings,
-) -> anyhow::Result<()> {
-    for &axis in axes {
-        ensure!(
-            settings.axes[axis as usize].commissioned,
-            "--settings: {axis} is not commissioned; leave --settings out, or commission it with --stage {}",
-            stage.path.display()
-        );
     }
     Ok(())
 }

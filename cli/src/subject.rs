@@ -234,7 +234,7 @@ impl Subject {
 
 impl Destination {
     /// Writes what a step changes in the axis' settings, if that is asked for: into those that the step started from, else
-    /// those of the machine, else the defaults.
+    /// those of the machine, else the built-in ones without any law.
     pub(super) fn write(
         &self,
         subject: &Subject,
@@ -250,7 +250,7 @@ impl Destination {
         let mut file = match (subject.start(Some(path))?, machine) {
             (Some(file), _) => file,
             (None, Some(machine)) => SettingsFile::new(machine),
-            (None, None) => kept::built_in(),
+            (None, None) => kept::without_laws(),
         };
         let start = file.stage.clone();
         change(&mut file.stage.axes[axis.index()]);

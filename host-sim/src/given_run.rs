@@ -344,10 +344,10 @@ impl GivenRun {
     fn record(&mut self) -> Result<(), RunError> {
         let state = self.machine.state();
         let Some(since) = self.since else {
-            return if self.tick > MOST_STARTING_TICKS {
-                Err(RunError::NotStarted)
-            } else {
-                Ok(())
+            return match self.machine.refusal() {
+                Some(refusal) => Err(RunError::Refused(refusal)),
+                None if self.tick > MOST_STARTING_TICKS => Err(RunError::NotStarted),
+                None => Ok(()),
             };
         };
         if state.axes()[0].mode() != MotionMode::Plan {

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use quadrant_law::admission::Refusal;
 use quadrant_law::axes::{AxisName, PerAxis};
 use quadrant_law::cancelling::SpindleSpeed;
 use quadrant_law::command::Command;
@@ -112,6 +113,15 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
         &self.events
     }
 
+    /// The last request that was refused, by its reason.
+    pub fn refusal(&self) -> Option<Refusal> {
+        let refused = |(_, event): &(u32, Event)| match event {
+            Event::Refused(_, refusal) => Some(*refusal),
+            _ => None,
+        };
+        self.events.iter().rev().find_map(refused)
+    }
+
     /// Gives an axis of the plan another motion, for [`Command::StartMove`]. It must not be following the plan.
     pub fn set_motion(&mut self, axis: AxisName, motion: Motion<S>) {
         self.plan[axis as usize] = motion;
@@ -191,7 +201,7 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
     }
 
     fn supervise(&mut self) {
-        let view = self.stage.as_ref().view(&self.state);
+        let view = self.stage.as_ref().view(&self.plan, &self.state);
         let decision = self.supervisor.step(view, self.requests.pop_front());
         self.command = decision.command;
         let tick = self.state.tick();

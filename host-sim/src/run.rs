@@ -1,5 +1,6 @@
 //! One run: a machine on a simulated stage, and the traces of its axes.
 
+use quadrant_law::admission::Refusal;
 use quadrant_law::axis::telemetry::AxisTelemetry;
 use quadrant_law::safety::SafetyState;
 use quadrant_law::scalar::Scalar;
@@ -52,11 +53,11 @@ pub enum RunError {
         axis = .0.axis.map_or("the stage", quadrant_law::axes::AxisName::as_str), tick = .0.tick,
         cause = .0.code.cause(), remedy = .0.code.remedy())]
     Fault(quadrant_law::safety::Fault),
+    /// The law refused to enable the outputs, or to start.
+    #[error("the axes did not start: {0}")]
+    Refused(Refusal),
     /// The axes did not start.
-    #[error(
-        "the axes did not start: nobody has commissioned them, or one that has a law is not commissioned; commission them, or set \
-        `commissioned` of each that has a law"
-    )]
+    #[error("the axes did not start")]
     NotStarted,
     /// The motion did not end.
     #[error("the motion has not ended after {0} ticks")]
@@ -82,6 +83,9 @@ pub fn run<S: Scalar, const N: usize>(
             plant.read_counters(),
             operator.request(tick as u32),
         ));
+        if !started && let Some(refusal) = machine.refusal() {
+            return Err(RunError::Refused(refusal));
+        }
         let state = machine.state();
         if let SafetyState::Faulted(fault) = state.safety() {
             return Err(RunError::Fault(fault));

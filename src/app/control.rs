@@ -200,7 +200,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     /// Puts the supervising task's view of the last tick in the place of an older one.
     #[inline(never)]
     pub fn take_snapshot(&self, snapshot: &mut Snapshot<S>) {
-        snapshot.renew(&self.stage(), &self.state);
+        snapshot.renew(&self.stage(), &self.plan, &self.state);
         snapshot.switches = self.switches;
         snapshot.orders = self.orders;
         snapshot.exchanges = self.exchanges;

@@ -11,7 +11,7 @@ use quadrant_law::safety::Switches;
 use quadrant_law::safety::monitor::FollowingState;
 use quadrant_law::safety::oscillation::OscillationReading;
 use quadrant_law::scalar::Scalar;
-use quadrant_law::stage::{StageRef, StageState};
+use quadrant_law::stage::{Plan, StageRef, StageState};
 use quadrant_law::units::{EncoderCount, Position};
 
 /// One axis in a [`Snapshot`].
@@ -64,16 +64,25 @@ pub struct Snapshot<S> {
 
 impl<S: Scalar> Snapshot<S> {
     /// Takes a snapshot of the stage, which has taken no order yet and whose inputs are not known.
-    pub fn of(stage: &StageRef<'_, S>, state: &StageState<S, FIRMWARE_ELEMENTS>) -> Self {
+    pub fn of(
+        stage: &StageRef<'_, S>,
+        plan: &Plan<S>,
+        state: &StageState<S, FIRMWARE_ELEMENTS>,
+    ) -> Self {
         let mut snapshot = Self::default();
-        snapshot.renew(stage, state);
+        snapshot.renew(stage, plan, state);
         snapshot
     }
 
     /// Takes a snapshot of the stage in the place of an older one; what control alone knows stays.
     // Field by field: a whole one is more than the registers hold, and passes through the stack.
     #[inline(always)]
-    pub fn renew(&mut self, stage: &StageRef<'_, S>, state: &StageState<S, FIRMWARE_ELEMENTS>) {
+    pub fn renew(
+        &mut self,
+        stage: &StageRef<'_, S>,
+        plan: &Plan<S>,
+        state: &StageState<S, FIRMWARE_ELEMENTS>,
+    ) {
         for (place, axis) in self.axes.iter_mut().zip(state.axes()) {
             let telemetry = axis.telemetry();
             *place = AxisSnapshot {
@@ -91,7 +100,7 @@ impl<S: Scalar> Snapshot<S> {
         self.tick = state.tick();
         self.indexed = state.axes().by_ref().map(AxisState::is_indexed);
         self.injection = state.injection_progress();
-        self.view = stage.view(state);
+        self.view = stage.view(plan, state);
     }
 }
 

@@ -9,8 +9,8 @@ use quadrant_law::friction::Direction;
 use quadrant_law::reference::Velocity;
 use quadrant_law::safety::{AxisSwitches, Switches};
 use quadrant_link::message::{
-    AxisName, AxisPoint, Body, InjectRequest, Motion, Plan, PointToPoint, Reply, SetPoint,
-    SettingsRequest, StreamRequest,
+    AxisName, AxisPoint, Body, InjectRequest, LinkError, Motion, Plan, PointToPoint, Reply,
+    SetPoint, SettingsRequest, StreamRequest,
 };
 use quadrant_settings::draft::Draft;
 use quadrant_settings::{HomeSwitch, HomingSettings, StageSettings, TravelSettings};
@@ -586,4 +586,62 @@ fn a_run_after_a_move_is_checked_by_the_reach_of_the_plan() {
     all(&mut tasks, &[Body::Stop]);
     tasks.run(2000);
     assert!(tasks.ask(Body::Run).is_err());
+}
+
+/// x and z are commissioned; y has no law.
+fn y_without_a_law() -> Tasks {
+    let mut settings = limited(FAST);
+    settings.axes[1] = StageSettings::default().axes[1].clone();
+    let mut tasks = Tasks::new(&settings, 1);
+    all(&mut tasks, &[Body::Enable]);
+    tasks
+}
+
+/// The text of a refusal.
+fn refusal_of(answer: Result<Reply, LinkError>) -> String {
+    match answer {
+        Err(LinkError::Refused(text) | LinkError::Invalid(text)) => text.to_string(),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_plan_that_moves_an_axis_without_a_law_is_refused_by_the_name_of_the_axis() {
+    let mut tasks = y_without_a_law();
+    all(&mut tasks, &[plan(1.0, (40.0, 100.0))]);
+    let text = refusal_of(tasks.ask(Body::Run));
+    assert!(text.starts_with("y: ") && text.contains("no law"), "{text}");
+    tasks.run(200);
+    let upper = tasks.upper.borrow();
+    assert!(upper.outputs.enabled && !upper.state().is_running());
+}
+
+#[test]
+fn a_streamed_set_point_that_moves_an_axis_without_a_law_is_refused_by_the_name_of_the_axis() {
+    let mut tasks = y_without_a_law();
+    let open = StreamRequest::Open { period_ticks: 10 };
+    all(&mut tasks, &[Body::Stream(open)]);
+    let still = AxisPoint {
+        position_mm: 0.0,
+        velocity_mm_s: 0.0,
+        acceleration_mm_s2: 0.0,
+    };
+    let moved = AxisPoint {
+        position_mm: 1e-4,
+        ..still
+    };
+    let points = StreamRequest::Points {
+        sequence: 0,
+        points: [SetPoint {
+            axes: [still, moved, still],
+        }]
+        .into_iter()
+        .collect(),
+        last: false,
+    };
+    let text = refusal_of(tasks.ask(Body::Stream(points)));
+    assert!(
+        text.contains("set point 1: y: ") && text.contains("no law"),
+        "{text}"
+    );
 }

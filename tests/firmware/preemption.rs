@@ -9,7 +9,7 @@ use quadrant_link::message::{
     AxisName, Body, Harmonic, LinkError, Motion, Plan, PointToPoint, Provenance, Reply, Request,
     SettingsRequest,
 };
-use quadrant_settings::StageSettings;
+use quadrant_settings::{PlanSettings, StageSettings};
 
 use quadrant_fault_bench::flash::Flash;
 use quadrant_fault_bench::tasks::Tasks;
@@ -617,7 +617,10 @@ fn a_crash_does_not_hide_invalid_settings() {
         FaultCode::Panic
     );
     let stage: quadrant_law::stage::Stage<f32> = settings().build().expect("valid");
-    let view = stage.as_ref().view(&state);
+    let plan = PlanSettings::default()
+        .build(&settings())
+        .expect("no motion");
+    let view = stage.as_ref().view(&plan, &state);
     assert!(view.settings_invalid);
     assert_eq!(
         quadrant_law::admission::refusal(view, Command::ResetFault),

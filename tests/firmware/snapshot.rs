@@ -15,7 +15,7 @@ fn the_index_pulse_that_an_encoder_has_shown_is_reported_of_that_axis_alone() {
     let mut shown = |index: Option<u32>| {
         inputs.readings[1].index = index;
         stage.tick(&plan, &mut state, &inputs);
-        *Snapshot::of(&stage.as_ref(), &state).indexed
+        *Snapshot::of(&stage.as_ref(), &plan, &state).indexed
     };
     assert_eq!(shown(None), [false; 3]);
     assert_eq!(shown(Some(0)), [false, true, false]);

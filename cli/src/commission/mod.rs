@@ -216,7 +216,7 @@ impl Arguments {
         let mut file = match start {
             Some(file) => file,
             None if path.exists() => SettingsFile::read(&path)?,
-            None => kept::built_in(),
+            None => kept::built_in_for(axis),
         };
         kept::refuse_loss_beside(&path, &file.stage, axis)?;
         let base = file.stage.axes[axis as usize].clone();
@@ -323,6 +323,18 @@ fn again(axis: AxisName, begun: &Begun, at_mm: f64) -> anyhow::Result<Travel> {
     Ok(travel)
 }
 
+/// Says that soft limits do not count from where an axis stands that is not homed.
+fn warn_of_origins(axis: AxisName, settings: &AxisSettings) {
+    if let Some(soft) = settings.limits.travel_mm {
+        let mark_mm = settings.homing.map_or(0.0, |homing| homing.mark_mm);
+        warn!(
+            "note: --travel counts from where {axis} stands; limits.travel_mm ({} to {} mm) counts from the origin that homing sets, with \
+             its mark at homing.mark_mm = {mark_mm} mm: check both before {axis} is homed",
+            soft.negative, soft.positive
+        );
+    }
+}
+
 impl Job<'_> {
     /// Commissions the axis, and writes everything that was found. The machine has its old settings afterwards unless the
     /// new ones are to act, also after an error.
@@ -344,6 +356,9 @@ impl Job<'_> {
         };
         kept::refuse_loss_beside(&result, &file.stage, axis)?;
         let base = file.stage.axes[axis as usize].clone();
+        if self.travel.is_some() && machine.free_travel(axis)?.is_none() {
+            warn_of_origins(axis, &base);
+        }
         let folder = output.below(axis.as_str());
         folder.ready()?;
         let experiments = folder.file(EXPERIMENTS)?;

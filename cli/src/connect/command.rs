@@ -16,6 +16,13 @@ use crate::commission::Request;
 use crate::plane::PlaneName;
 use crate::subject::{travel, travel_both_ways};
 
+/// Format of the file of `plan`.
+const PLAN_FILE: &str = "The file has one line, `motions = [X, Y, Z]`, and each of them is one of
+  \"hold\"
+  { harmonic = { amplitude_mm = 10, frequency_hz = 0.2, phase_rad = 0, cycles = 3, lead_s = 1 } }
+  { point-to-point = { distance_mm = 10, max_velocity_mm_s = 50, max_acceleration_mm_s2 = 500, max_jerk_mm_s3 = 1e4 } }
+A harmonic without `cycles` goes on until `stop`.";
+
 /// One thing to ask of the machine.
 #[derive(Clone, Debug, Subcommand, IntoStaticStr)]
 #[strum(serialize_all = "kebab-case")]
@@ -75,6 +82,7 @@ pub(super) enum Command {
     /// Start the plan: the motions of `plan` or `circle`, from where the axes stand. `wait rest` waits for their end.
     Run,
     /// Exchange the plan for that of a TOML file: `motions`, one for each axis.
+    #[command(after_help = PLAN_FILE)]
     Plan {
         /// The file: TOML.
         file: PathBuf,

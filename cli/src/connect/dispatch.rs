@@ -28,7 +28,7 @@ pub(super) fn run(session: &mut Session, command: &Command, source: &str) -> boo
             failure.is_none()
         }
         Err(error) => {
-            let error = explained(&error);
+            let error = explained(command, &error);
             session.printer.error(command.name(), source, &error);
             false
         }
@@ -109,10 +109,19 @@ fn record(session: &mut Session, options: &RecordOptions) -> anyhow::Result<Answ
     })
 }
 
-/// An error and its causes; most messages contain their cause's already.
-fn explained(error: &anyhow::Error) -> String {
-    match error.downcast_ref::<ClientError>() {
-        Some(error) => error.to_string(),
-        None => quadrant_cli::explained(error),
+/// An error and its causes; most messages contain their cause's already. A request that failed is named by the command that made it,
+/// unless that makes requests of many kinds.
+fn explained(command: &Command, error: &anyhow::Error) -> String {
+    let Some(error) = error.downcast_ref::<ClientError>() else {
+        return quadrant_cli::explained(error);
+    };
+    let text = error.to_string();
+    let makes_many = matches!(command, Command::Identify(_) | Command::Commission(_));
+    match error
+        .request()
+        .and_then(|request| text.strip_prefix(request))
+    {
+        Some(rest) if !makes_many => format!("{}{rest}", command.name()),
+        _ => text,
     }
 }

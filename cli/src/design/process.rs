@@ -24,17 +24,16 @@ pub(super) struct Model {
     /// The axis of the settings whose model and gains are taken.
     #[arg(long, value_enum, default_value_t = Axis::X)]
     pub(super) axis: Axis,
-    /// Settings of the stage, as `quadrant commission` writes them; without it, those in the folder for results, or the built-in
-    /// ones.
+    /// Settings of the stage, as `quadrant commission` writes them; without it, those of --into if it is there, else those in the folder
+    /// for results, else the built-in ones.
     #[arg(long, value_name = "FILE")]
     pub(super) settings: Option<PathBuf>,
+    /// Write the result into the settings of --axis in this file; the other settings are those of --settings, else those of this file
+    /// if it is there.
+    #[arg(long, value_name = "FILE")]
+    into: Option<PathBuf>,
     /// A, acceleration per volt, mm/(V s²), in place of the settings' model; the next three go with it.
-    #[arg(
-        long,
-        value_name = "MM_PER_V_S2",
-        requires = "damping",
-        conflicts_with = "settings"
-    )]
+    #[arg(long, value_name = "MM_PER_V_S2", requires = "damping")]
     gain: Option<f64>,
     /// B, damping over mass, 1/s.
     #[arg(long, value_name = "PER_S", requires = "gain")]
@@ -57,26 +56,28 @@ impl Model {
     /// Reads the stage's settings, and says where they come from: what is in the folder for results stays there, so a design goes on
     /// from it.
     pub(super) fn file(&self, output: &Output) -> anyhow::Result<(SettingsFile, String)> {
-        let of = |path: &Path| format!("The {} axis of {}", self.axis.name(), path.display());
-        if let Some(path) = &self.settings {
+        let of = |path: &Path| match self.gain {
+            Some(_) => "A model given by its parameters".to_owned(),
+            None => format!("The {} axis of {}", self.axis.name(), path.display()),
+        };
+        let existing = self.into.as_ref().filter(|path| path.exists());
+        if let Some(path) = self.settings.as_ref().or(existing) {
             return Ok((SettingsFile::read(path)?, of(path)));
         }
         let left = output.file(SETTINGS)?;
-        let (file, subject) = if left.exists() {
+        if left.exists() {
             warn!(
                 "starting from {}; --settings takes another file, --out another folder",
                 left.display()
             );
-            (SettingsFile::read(&left)?, of(&left))
-        } else {
-            let subject = format!("The {} axis of the built-in settings", self.axis.name());
-            (kept::built_in(), subject)
+            return Ok((SettingsFile::read(&left)?, of(&left)));
+        }
+        let file = match self.gain {
+            // The built-in models are not those of this machine.
+            Some(_) => kept::built_in_for(self.axis.into()),
+            None => kept::built_in(),
         };
-        let subject = match self.gain {
-            Some(_) => "A model given by its parameters".to_owned(),
-            None => subject,
-        };
-        Ok((file, subject))
+        Ok((file, of(Path::new("the built-in settings"))))
     }
 
     /// The axis' settings in them.
@@ -158,14 +159,18 @@ impl Model {
             );
         }
         file.add_provenance(command, self.axis.name(), records, &[sets]);
-        let path = output.file(SETTINGS)?;
+        let path = match &self.into {
+            Some(path) => path.clone(),
+            None => output.file(SETTINGS)?,
+        };
         kept::refuse_loss(&path, &start, &file.stage)?;
         for line in kept::write(&file, &start, &path)? {
             say!("{line}");
         }
         say!(
-            "{}: the settings of the stage with this {sets}",
-            path.display()
+            "{}: the settings with this {sets} of {}",
+            path.display(),
+            self.axis.name()
         );
         Ok(())
     }

@@ -12,8 +12,8 @@ use quadrant_pages::identify::motion::{
 use quadrant_pages::parts::provenance;
 use quadrant_settings::StageSettings;
 use quadrant_tune::identify::motion::{
-    Candidate, CascadeLoop, MotionFitSettings, Signals, fit_motion, recommended, recommended_by,
-    refined, replay_closed_loop, replay_open_loop, shuttle, validate,
+    Candidate, CascadeLoop, MotionFitSettings, MotionModel, Signals, fit_motion, recommended,
+    recommended_by, refined, replay_closed_loop, replay_open_loop, shuttle, validate,
 };
 use quadrant_tune::record::{ColumnNames, MotionOptions, Recording};
 use quadrant_tune::test_axis::TestAxis;
@@ -193,6 +193,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .chain(&arguments.validate)
         .cloned()
         .collect();
+    say!("{}", plant_line(model));
     destination.write(
         subject,
         stage,
@@ -211,6 +212,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         say!("The model explains {explained:.1} % of the voltage");
     }
     Ok(())
+}
+
+/// The plant of a model in a line, in the units of `quadrant design`.
+fn plant_line(model: &MotionModel) -> String {
+    let plant = model.plant();
+    format!(
+        "Plant: gain {:.2} mm/(V s²), damping {:.2} 1/s, delay {:.6} s",
+        plant.gain_mm_per_v_s2, plant.damping_per_s, plant.delay_s
+    )
 }
 
 fn cascade(arguments: &Arguments) -> anyhow::Result<Option<CascadeLoop>> {

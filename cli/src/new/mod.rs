@@ -22,6 +22,7 @@ use quadrant_written::whole;
 
 use self::ask::Questions;
 use self::presets::{Amplifier, Encoder};
+use super::kept;
 use super::subject::travel_both_ways;
 
 /// Options of `quadrant new`.
@@ -68,7 +69,8 @@ pub(super) struct Arguments {
     /// Largest acceleration of the axis, mm/s².
     #[arg(long, value_name = "MM_S2", value_parser = positive)]
     max_acceleration: Option<f64>,
-    /// Travel, mm, in force once the axis is homed: 200 for as much either way, or -5..180.
+    /// Travel, mm, in force once the axis is homed, in positions that count from the origin that homing sets (homing.mark_mm): 200 for as
+    /// much either way, or -5..180.
     #[arg(long, value_name = "MM", value_parser = travel_both_ways, allow_hyphen_values = true)]
     travel: Option<Travel>,
     /// Control rate, Hz.
@@ -287,6 +289,7 @@ fn write(stage: StageSettings, axes: &[AxisName], path: &Path) -> anyhow::Result
     let text = file
         .sparse_text(path)
         .context("the firmware would refuse these settings; nothing was written")?;
+    kept::make_folder(path)?;
     whole::write(path, text).with_context(|| format!("{} cannot be written", path.display()))
 }
 
@@ -330,7 +333,9 @@ fn next(machine: &Machine, axes: &[AxisName], path: &Path) -> String {
          On a board: `load {file}`, `store` and `reboot` in\n\
          \x20   quadrant connect --port PATH\n\
          then the same command with --machine serial:PATH, and with --travel as far as\n\
-         it may go from where it stands.",
+         it may go from where it stands.\n\
+         limits.travel_mm counts from the origin that homing sets, where homing.mark_mm is\n\
+         the position of its mark; 0 unless it is given.",
         names.join(", "),
         short(count_um),
         short(machine.rate_hz),

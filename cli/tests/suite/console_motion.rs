@@ -180,3 +180,46 @@ fn a_circle_ends_where_it_began_however_often_it_runs() {
         }
     }
 }
+
+#[test]
+fn an_error_names_the_command_that_was_typed() {
+    for (script, said, other) in [
+        (
+            "reset\n",
+            "reset: refused: there is no fault",
+            "reset-fault",
+        ),
+        ("enable\nstore\n", "store: refused: ", "settings: refused"),
+    ] {
+        let played = play(&[], script);
+        assert!(!played.succeeded, "{script}");
+        assert!(
+            played.errors.contains(said) && !played.errors.contains(other),
+            "{}",
+            played.errors
+        );
+    }
+}
+
+#[test]
+fn the_help_of_plan_shows_a_file_that_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let help = command::succeed(folder.path(), &["connect", "plan", "--help"]);
+    // As long as a terminal is wide.
+    let words: Vec<&str> = help.split_whitespace().collect();
+    let words = words.join(" ");
+    let motions = ["{ harmonic", "{ point-to-point"].map(|begin| {
+        let (_, rest) = words.split_once(begin).unwrap();
+        let (inner, _) = rest.split_once("} }").unwrap();
+        format!("{begin}{inner}}} }}")
+    });
+    let file = folder.path().join("plan.toml");
+    std::fs::write(
+        &file,
+        format!("motions = [{}, {}, \"hold\"]", motions[0], motions[1]),
+    )
+    .unwrap();
+    let script = format!("enable\nplan {}\n", file.display());
+    let played = play(&[], &script);
+    assert!(played.succeeded, "{}", played.errors);
+}

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use quadrant_law::axes::AxisName;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::filter::FilterSettings;
 use quadrant_settings::StageSettings;
@@ -211,4 +212,81 @@ fn what_cannot_be_designed_is_refused_with_what_can() {
     assert!(fail(at, &share).contains("at most 1"));
     let rate = ["pid", "--rate-hz", "20"];
     assert!(fail(at, &rate).contains("1000 to 100000"));
+}
+
+/// A file of `quadrant new` for x.
+fn new(at: &Path, file: &str) {
+    let words = format!(
+        "new {file} --count-um 0.5 --amplifier analog-10v --max-velocity 200 --max-acceleration 2000 --travel 150"
+    );
+    command::succeed(at, &words.split(' ').collect::<Vec<_>>());
+}
+
+/// A design on numbers.
+const ON_NUMBERS: &str = "pid --gain 68560 --damping 143 --stiffness 0 --delay 0.00107 --best";
+
+#[test]
+fn a_design_is_written_into_the_settings_of_its_axis_and_the_others_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    new(at, "mine.toml");
+    let read = |file: &str| SettingsFile::read(&at.join(file)).unwrap().stage;
+    let before = read("mine.toml");
+    let into = format!("{ON_NUMBERS} --into mine.toml");
+    let said = succeed(at, &into.split(' ').collect::<Vec<_>>());
+    assert!(
+        said.contains("mine.toml: the settings with this feedback.pid of x"),
+        "{said}"
+    );
+    let mut after = read("mine.toml");
+    let pid = after.axes[0].feedback.pid;
+    assert!(pid.kp_v_per_mm > 0.0 && pid.kd_v_s_per_mm > 0.0);
+    after.axes[0].feedback.pid = before.axes[0].feedback.pid;
+    assert_eq!(after, before);
+    assert!(!at.join("quadrant-out/settings.toml").exists());
+    // Numbers stand for the model of settings that are given, too.
+    let given = format!("{ON_NUMBERS} --settings mine.toml --into other.toml");
+    succeed(at, &given.split(' ').collect::<Vec<_>>());
+    assert_eq!(read("other.toml").axes[0].feedback.pid, pid);
+    // Of the other axes of a machine nothing is known.
+    let alone = format!("{ON_NUMBERS} --into alone.toml");
+    succeed(at, &alone.split(' ').collect::<Vec<_>>());
+    let alone = read("alone.toml");
+    assert_eq!(alone.uncommissioned(), Some(AxisName::X));
+    assert!(
+        alone.axes[1..]
+            .iter()
+            .all(|axis| axis.feedback.pid.kp_v_per_mm == 0.0)
+    );
+}
+
+#[test]
+fn runs_under_settings_that_do_not_suit_them_are_refused_at_once_with_the_axis_and_the_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    new(at, "mine.toml");
+    let into = format!("{ON_NUMBERS} --into mine.toml");
+    succeed(at, &into.split(' ').collect::<Vec<_>>());
+    for run in [
+        &["compare"][..],
+        &["circle"],
+        &["replay", "--axis", "x", "--reference", "none.csv"],
+    ] {
+        let words = [run, &["--settings", "mine.toml"]].concat();
+        let said = command::fail(at, &words);
+        assert!(
+            said.contains("mine.toml: x has a law, but is not commissioned: `quadrant commission"),
+            "{said}"
+        );
+    }
+    let path = at.join("mine.toml");
+    let mut file = SettingsFile::read(&path).unwrap();
+    file.stage.axes[0].commissioned = true;
+    file.write(&path, whole::write).unwrap();
+    let said = command::fail(at, &["compare", "--settings", "mine.toml"]);
+    assert!(
+        said.contains("x has the law PID and no nonlinear gain")
+            && said.contains("`quadrant design npid --axis x --settings mine.toml"),
+        "{said}"
+    );
 }

@@ -282,6 +282,50 @@ fn a_motion_record_is_saved_read_again_and_put_into_settings() {
     assert!(fail(at, &cascade).contains("--cascade-kv"));
 }
 
+/// A record of z, in the folder `rec`.
+fn record_z(at: &Path) {
+    let words = ["motion", "--axis", "z", "--rounds", "1", "--out", "rec"];
+    succeed(at, &words);
+}
+
+const RECORD: &str = "rec/motion-recording.csv";
+
+#[test]
+fn what_is_identified_goes_into_settings_that_have_no_law_yet_and_brings_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    record_z(at);
+    let words = "new mine/z.toml --axis z --count-um 0.5 --amplifier analog-10v --max-velocity 200 --max-acceleration 2000 --travel 100";
+    command::succeed(at, &words.split(' ').collect::<Vec<_>>());
+    for into in ["mine/z.toml", "of-nothing.toml"] {
+        let words = ["motion", "--axis", "z", "--record", RECORD, "--into", into];
+        succeed(at, &words);
+        let stage = SettingsFile::read(&at.join(into)).unwrap().stage;
+        let gain = stage.axes[2].plant.unwrap().gain_mm_per_v_s2;
+        assert!((gain / 48_500.0 - 1.0).abs() < 0.1, "{gain}");
+        assert!(stage.axes[2].friction.sliding.positive.curve.coulomb_v > 0.0);
+        assert_eq!(stage.uncommissioned(), None, "{into}");
+        for axis in &stage.axes {
+            assert_eq!(axis.feedback.pid.kp_v_per_mm, 0.0, "{into}");
+        }
+    }
+}
+
+#[test]
+fn the_plant_is_printed_though_no_settings_are_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    record_z(at);
+    let said = succeed(at, &["motion", "--record", RECORD, "--out", "out"]);
+    let line = said
+        .lines()
+        .find(|line| line.starts_with("Plant: gain "))
+        .unwrap();
+    let inertia = value(&at.join("out/motion-parameters.csv"), "M'");
+    let gain: f64 = line.split(' ').nth(2).unwrap().parse().unwrap();
+    assert!((gain * inertia - 1.0).abs() < 1e-3, "{line}");
+}
+
 /// An axis without a counterweight creeps while its outputs are off between the moves.
 #[test]
 fn the_motion_that_is_recorded_of_any_axis_is_read_again() {

@@ -160,3 +160,15 @@ fn a_new_file_of_another_rate_is_commissioned_over_the_firmware_on_a_short_trave
         is_commissioned_at(&commissioned(rate, "simulated", &travel), rate_hz);
     }
 }
+
+#[test]
+fn a_file_is_written_into_a_folder_that_is_not_there_and_says_where_its_soft_limits_count_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let words = [&["new", "deep/mine/x.toml"][..], &WHOLE].concat();
+    let shown = command::succeed(at, &words);
+    assert!(at.join("deep/mine/x.toml").exists());
+    for name in ["--travel", "limits.travel_mm", "homing.mark_mm"] {
+        assert!(shown.contains(name), "{name}: {shown}");
+    }
+}

@@ -36,8 +36,16 @@ pub struct StageView {
     ///
     /// [`StageRef::is_commissioned`]: crate::stage::StageRef::is_commissioned
     pub commissioned: bool,
+    /// The first axis that has a law and was not commissioned.
+    pub uncommissioned: Option<AxisName>,
     /// The axes that nobody has commissioned and that have no law: they do not move.
     pub inert: PerAxis<bool>,
+    /// The first inert axis that the plan would move.
+    pub inert_planned: Option<AxisName>,
+    /// The first inert axis that the first segment of the stream would move.
+    pub inert_streamed: Option<AxisName>,
+    /// The first inert axis that the plan would move, if the injection that waits starts the plan.
+    pub inert_injected: Option<AxisName>,
     /// The holding brake is being released or applied.
     pub brake_moves: bool,
     /// The stations that may enable the outputs.
@@ -73,8 +81,12 @@ pub enum Refusal {
     NoInjection,
     /// A voltage is being injected.
     Injecting,
-    /// No axis is commissioned, or one that has a law is not.
+    /// No axis is commissioned.
     NotCommissioned,
+    /// The axis has a law and is not commissioned.
+    LawNotCommissioned(AxisName),
+    /// The axis has no law that could move it.
+    NoLaw(AxisName),
     /// The holding brake is being released or applied.
     BrakeMoves,
     /// The host alone may enable.
@@ -109,7 +121,13 @@ impl Refusal {
             }
             Self::Injecting => "a voltage is being injected; stop it or wait until it ends",
             Self::NotCommissioned => {
-                "not commissioned: no axis is, or this one is not, or one with a law is not; run `quadrant commission`, or load a settings file with `commissioned = true`"
+                "not commissioned: no axis is; run `quadrant commission`, or load a settings file with `commissioned = true`"
+            }
+            Self::LawNotCommissioned(_) => {
+                "the axis has a law, but is not commissioned: commission it, or load settings in which it has none"
+            }
+            Self::NoLaw(_) => {
+                "the axis has no law and cannot move: commission it, or leave it out of the motion"
             }
             Self::BrakeMoves => "the brake is being released or applied; ask again",
             Self::HostOnly => "the host alone may enable (operation.enabled_by)",
@@ -148,9 +166,11 @@ impl Refusal {
     pub const fn axis(&self) -> Option<AxisName> {
         match self {
             Self::BadInput(interlock) => interlock.axis,
-            Self::AxisBusy(axis) | Self::NotAtStandstill(axis) | Self::NotHomed(axis) => {
-                Some(*axis)
-            }
+            Self::AxisBusy(axis)
+            | Self::NotAtStandstill(axis)
+            | Self::NotHomed(axis)
+            | Self::LawNotCommissioned(axis)
+            | Self::NoLaw(axis) => Some(*axis),
             _ => None,
         }
     }
@@ -197,7 +217,10 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
         }
         Command::Enable if view.safety == SafetyState::Start => Some(Refusal::Starting),
         Command::Enable if view.settings_invalid => Some(Refusal::SettingsInvalid),
-        Command::Enable if !view.commissioned => Some(Refusal::NotCommissioned),
+        Command::Enable if !view.commissioned => Some(match view.uncommissioned {
+            Some(axis) => Refusal::LawNotCommissioned(axis),
+            None => Refusal::NotCommissioned,
+        }),
         Command::Enable if view.locked => Some(Refusal::Locked),
         Command::Enable if !view.safety.is_enabled() && view.moving.is_some() => {
             view.moving.map(Refusal::NotAtStandstill)
@@ -217,7 +240,14 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
         Command::Home(axis) | Command::StartMove(axis) | Command::Jog(axis, _)
             if view.inert[axis] =>
         {
-            Some(Refusal::NotCommissioned)
+            Some(Refusal::NoLaw(axis))
+        }
+        Command::Run if view.inert_planned.is_some() => view.inert_planned.map(Refusal::NoLaw),
+        Command::StartStream if view.inert_streamed.is_some() => {
+            view.inert_streamed.map(Refusal::NoLaw)
+        }
+        Command::StartInjection if view.inert_injected.is_some() => {
+            view.inert_injected.map(Refusal::NoLaw)
         }
         Command::StartMove(axis) if view.awaiting_homing[axis] => Some(Refusal::NotHomed(axis)),
         Command::StartStream if !view.stream_ready => Some(Refusal::NoStream),

@@ -277,9 +277,19 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
 }
 
 impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
-    /// The view of the stage as its last tick left it.
+    /// The view of the stage as its last tick left it, with the plan that it would run.
     #[inline(always)]
-    pub fn view(&self, state: &StageState<S, N>) -> StageView {
+    pub fn view(&self, plan: &Plan<S>, state: &StageState<S, N>) -> StageView {
+        let inert = self
+            .axes
+            .map(|axis| axis.commissioning() == Commissioning::Inert);
+        let first = |moves: PerAxis<bool>| {
+            let mut axes = AxisName::ALL.into_iter();
+            axes.find(|&name| inert[name] && moves[name])
+        };
+        let planned = first(plan.by_ref().map(|motion| !matches!(motion, Motion::Hold)));
+        let injection = state.injection.injection();
+        let with_plan = injection.is_some_and(|own| own.coupling() == Coupling::WithPlan);
         StageView {
             safety: state.safety(),
             running: state.is_running(),
@@ -296,7 +306,11 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             injection_ready: state.is_injection_ready() && self.may_inject(state),
             injecting: state.is_injecting(),
             commissioned: self.is_commissioned(),
-            inert: (self.axes).map(|axis| axis.commissioning() == Commissioning::Inert),
+            uncommissioned: self.uncommissioned(),
+            inert,
+            inert_planned: planned,
+            inert_streamed: first(state.axes.by_ref().map(AxisState::is_streamed_away)),
+            inert_injected: planned.filter(|_| with_plan),
             brake_moves: state.brake.is_moving(),
             enabled_by: self.operation.enabled_by,
             locked: state.locked,
@@ -324,12 +338,16 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
     /// True if an axis was commissioned, and no other has a law that could drive it.
     #[inline(always)]
     pub fn is_commissioned(&self) -> bool {
-        let has = |standing| {
-            self.axes
-                .iter()
-                .any(|axis| axis.commissioning() == standing)
-        };
-        has(Commissioning::Done) && !has(Commissioning::Missing)
+        let mut axes = self.axes.iter();
+        axes.any(|axis| axis.commissioning() == Commissioning::Done)
+            && self.uncommissioned().is_none()
+    }
+
+    /// The first axis that has a law and was not commissioned.
+    #[inline(always)]
+    fn uncommissioned(&self) -> Option<AxisName> {
+        let mut axes = AxisName::ALL.into_iter();
+        axes.find(|&name| self.axes[name].commissioning() == Commissioning::Missing)
     }
 }
 
@@ -423,7 +441,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             self.moving(state, tick)
         };
         if let Some(command) = inputs.command {
-            self.handle_command(state, command, driven, tick);
+            self.handle_command(plan, state, command, driven, tick);
         }
         if state.brake.is_moving() {
             turn_brake(state);
@@ -590,6 +608,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
     #[inline(never)]
     fn handle_command(
         &self,
+        plan: &Plan<S>,
         state: &mut StageState<S, N>,
         command: Command,
         driven: bool,
@@ -600,7 +619,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             return;
         }
         // The task that let it through saw an older state.
-        if admission::refusal(self.view(state), command).is_some() {
+        if admission::refusal(self.view(plan, state), command).is_some() {
             return;
         }
         // Held by the law until the brake holds; asked a second time, or in motion, at once.

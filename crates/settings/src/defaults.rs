@@ -10,6 +10,7 @@ use super::operation::{
     BrakeSettings, EmergencyReaction, LossReaction, OperationSettings, StreamingSettings,
 };
 use super::stage::StageSettings;
+use quadrant_law::axes::AxisName;
 use quadrant_law::axis::Commissioning;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::pid::PidGains;
@@ -57,12 +58,15 @@ impl StageSettings {
     /// True if an axis was commissioned, and no other has a law that could drive it: the control law enables the outputs
     /// only then.
     pub fn is_commissioned(&self) -> bool {
-        let has = |standing| {
-            self.axes
-                .iter()
-                .any(|axis| axis.commissioning() == standing)
-        };
-        has(Commissioning::Done) && !has(Commissioning::Missing)
+        let mut axes = self.axes.iter();
+        axes.any(|axis| axis.commissioning() == Commissioning::Done)
+            && self.uncommissioned().is_none()
+    }
+
+    /// The first axis that has a law and was not commissioned.
+    pub fn uncommissioned(&self) -> Option<AxisName> {
+        let mut axes = AxisName::ALL.into_iter();
+        axes.find(|&axis| self.axis(axis).commissioning() == Commissioning::Missing)
     }
 }
 

@@ -8,6 +8,7 @@ use super::leaves::limits::LONGEST_TRAVEL_MM;
 use super::stage::StageSettings;
 use crate::stream_planner::StreamLimits;
 use quadrant_law::axes::AxisName;
+use quadrant_law::axis::Commissioning;
 use quadrant_law::decimal::Decimal;
 use quadrant_law::reference::{MotionScale, MotionSettings, PointToPointSettings, Velocity};
 use quadrant_law::units::Position;
@@ -269,6 +270,7 @@ impl StageSettings {
                     .as_ref()
                     .filter(|_| homed)
                     .map(|travel| (position(travel.negative), position(travel.positive))),
+                has_law: self.axis(axis).commissioning() != Commissioning::Inert,
             }
         })
     }

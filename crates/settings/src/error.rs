@@ -35,6 +35,8 @@ pub enum Reason {
     IndexUnknown,
     /// The loop that the law closes at small errors is not shown to be stable on the plant.
     Unstable,
+    /// The axis counts as commissioned, and its law has no gain.
+    NoGain,
     /// It is not above the point before it.
     NotRising,
     /// The table made from the curve errs by more than 0.1 % of the breakaway level.
@@ -100,6 +102,10 @@ impl fmt::Display for SettingsError {
             Reason::Unstable => f.write_str(
                 ": the loop that the law closes at small errors is not shown to be stable on the axis' plant; \
                  lower its gains",
+            ),
+            Reason::NoGain => f.write_str(
+                ": the axis is commissioned, and its law has no gain; design one (`quadrant design pid`), or commission it \
+                 (`quadrant commission`)",
             ),
             Reason::NotRising => f.write_str(" must lie above the point before it"),
             Reason::NotFinite => f.write_str(" is not a finite number"),

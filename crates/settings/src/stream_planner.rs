@@ -5,6 +5,7 @@
 
 use core::fmt;
 
+use quadrant_law::admission::Refusal;
 use quadrant_law::axes::AxisName;
 use quadrant_law::decimal::Decimal;
 use quadrant_law::reference::{MotionScale, ReferenceSample, Segment, Velocity, steps_per_mm};
@@ -75,6 +76,8 @@ pub struct StreamLimits {
     pub max_acceleration_mm_s2: f64,
     /// Lowest and highest position, if the axis knows where it is.
     pub travel: Option<(Position, Position)>,
+    /// True if the axis has a law that can move it.
+    pub has_law: bool,
 }
 
 /// A set point of all axes, `number` periods after the start of the stream.
@@ -142,6 +145,9 @@ impl StreamPlanner {
         for (index, segment) in segments.iter_mut().enumerate() {
             let axis = AxisName::ALL[index];
             let (from, to) = (&self.axes[index], &point.axes[index]);
+            if !self.limits[index].has_law && to != from {
+                return refuse(StreamFlaw::NoLaw { axis });
+            }
             if point.last && !to.is_at_rest() {
                 return refuse(StreamFlaw::NotAtRest { axis });
             }
@@ -341,6 +347,11 @@ pub enum StreamFlaw {
         /// The axis that would do so.
         axis: AxisName,
     },
+    /// It moves an axis that has no law.
+    NoLaw {
+        /// The axis.
+        axis: AxisName,
+    },
 }
 
 /// A refused set point.
@@ -402,6 +413,7 @@ impl fmt::Display for StreamError {
                 "it ends the stream, and {axis} still moves there; let the last set point have no velocity and \
                  no acceleration"
             ),
+            StreamFlaw::NoLaw { axis } => Refusal::NoLaw(axis).fmt(f),
         }
     }
 }

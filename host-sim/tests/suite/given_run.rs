@@ -1,5 +1,6 @@
 //! References in memory: the same words as the plan of settings that they are samples of.
 
+use quadrant_law::admission::Refusal;
 use quadrant_law::axes::AxisName;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
@@ -96,5 +97,33 @@ fn axes_that_nobody_has_commissioned_do_not_start() {
     let truth = StageParameters::real();
     let mut run =
         GivenRun::of_axis(&StageSettings::default(), &truth, AxisName::X, reference, 1).unwrap();
-    assert!(matches!(run.advance(10_000), Err(RunError::NotStarted)));
+    let error = run.advance(10_000).unwrap_err();
+    assert!(
+        matches!(error, RunError::Refused(Refusal::NotCommissioned)),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_run_that_the_law_refuses_ends_at_once_with_the_axis_and_the_reason() {
+    let mut settings = StageSettings::simulated();
+    settings.axes[1].commissioned = false;
+    let mut plan = PlanSettings::default();
+    plan.motions[0] = sine(1.0);
+    let mut other = StageSettings::simulated();
+    other.axes[0] = StageSettings::default().axes[0].clone();
+    for (stage, reason) in [
+        (settings, Refusal::LawNotCommissioned(AxisName::Y)),
+        (other, Refusal::NoLaw(AxisName::X)),
+    ] {
+        let job = Job { stage, plan };
+        let mut machine = LawMachine::<f32, FIRMWARE_ELEMENTS>::new(&job).unwrap();
+        let mut plant = SimulatedStage::new(&StageParameters::ideal(), 1e4, 1);
+        let error = run(&mut machine, &mut plant, [5e-4; 3], TICKS).unwrap_err();
+        assert!(
+            matches!(error, RunError::Refused(refusal) if refusal == reason),
+            "{error}"
+        );
+        assert!(machine.state().tick() < 400);
+    }
 }

@@ -151,6 +151,18 @@ pub enum ClientError {
 }
 
 impl ClientError {
+    /// The name of the request that failed, with which the text begins; none where no single request did.
+    pub const fn request(&self) -> Option<&'static str> {
+        match self {
+            Self::Silent { what, .. }
+            | Self::Unsure { what, .. }
+            | Self::Restarted { what }
+            | Self::Refused { what, .. }
+            | Self::Unexpected { what, .. } => Some(what),
+            _ => None,
+        }
+    }
+
     pub(super) const fn silent(
         what: &'static str,
         endpoint: String,

@@ -191,6 +191,11 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
         self.mode() == MotionMode::Hold && self.generator.stream.is_ready(self.look_ahead)
     }
 
+    /// True if the stream that waits would move the axis with its first segment.
+    pub(crate) fn is_streamed_away(&self) -> bool {
+        self.generator.stream.moves_first()
+    }
+
     /// True if the axis' position is that of the machine, so that its travel is in force.
     pub fn is_homed(&self) -> bool {
         self.homed

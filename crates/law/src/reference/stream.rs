@@ -123,6 +123,12 @@ impl StreamState {
         current.ticks == 0 && next.ticks > 0 && next.first && next.start == position
     }
 
+    /// True if the segment that waits leaves its start.
+    pub fn moves_first(&self) -> bool {
+        let next = self.segments().1;
+        next.ticks > 0 && next.differences != [0; 5]
+    }
+
     /// Breaks the stream off and forgets what is left of it.
     pub fn clear(&mut self) {
         let [first, second] = &mut self.slots;

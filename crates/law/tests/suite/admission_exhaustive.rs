@@ -33,7 +33,7 @@ const MODES: [MotionMode; 7] = [
     MotionMode::OpenLoop,
 ];
 /// Flags of a view that are enumerated as bits.
-const FLAGS: u32 = 14;
+const FLAGS: u32 = 15;
 
 fn commands() -> [Command; 10] {
     let scale = MotionScale {
@@ -89,7 +89,11 @@ fn views() -> impl Iterator<Item = StageView> {
                     injection_ready: flag(7),
                     injecting: flag(8),
                     commissioned: flag(9),
+                    uncommissioned: (!flag(9) && flag(14)).then_some(AXIS),
                     inert: on_axis(flag(13)),
+                    inert_planned: flag(14).then_some(AXIS),
+                    inert_streamed: flag(14).then_some(AXIS),
+                    inert_injected: flag(14).then_some(AXIS),
                     locked: flag(12),
                     settings_invalid: flag(10),
                     brake_moves: flag(11),
@@ -166,6 +170,12 @@ fn no_motion_starts_but_on_an_enabled_stage_at_rest_whose_brake_is_released() {
                 _ => {
                     assert!(!view.running, "{command:?} {view:?}");
                     assert!(!view.awaiting_homing[AXIS], "{command:?} {view:?}");
+                    let without_law = match command {
+                        Command::Run => view.inert_planned,
+                        Command::StartStream => view.inert_streamed,
+                        _ => view.inert_injected,
+                    };
+                    assert_eq!(without_law, None, "{command:?} {view:?}");
                     assert!(
                         command != Command::StartStream || view.stream_ready,
                         "{view:?}"
@@ -218,6 +228,8 @@ fn every_refusal_says_something_of_its_own_and_names_its_axis() {
         Refusal::AxisBusy(AXIS),
         Refusal::NotAtStandstill(AXIS),
         Refusal::NotHomed(AXIS),
+        Refusal::NoLaw(AXIS),
+        Refusal::LawNotCommissioned(AXIS),
         of_axis(FaultCode::AmplifierFault, Some(AXIS)),
         of_axis(FaultCode::OutputMismatch, Some(AXIS)),
         of_axis(FaultCode::StaleSample, Some(AXIS)),

@@ -60,7 +60,7 @@ fn nothing_moves_before_the_brake_is_released() {
     let mut rig = rig();
     let outputs = rig.command(Command::Enable);
     assert!(outputs.enabled && outputs.brake_released);
-    let view = rig.stage.as_ref().view(&rig.state);
+    let view = rig.stage.as_ref().view(&rig.plan, &rig.state);
     assert_eq!(refusal(view, Command::Run), Some(Refusal::BrakeMoves));
     let ticks = (1..2 * RELEASE)
         .find(|_| {
@@ -77,7 +77,7 @@ fn the_law_holds_the_axes_until_the_brake_does() {
     let outputs = rig.command(Command::Disable);
     assert!(outputs.enabled && !outputs.brake_released);
     for command in [Command::Run, Command::Enable, Command::Home(AxisName::X)] {
-        let view = rig.stage.as_ref().view(&rig.state);
+        let view = rig.stage.as_ref().view(&rig.plan, &rig.state);
         assert_eq!(refusal(view, command), Some(Refusal::BrakeMoves));
     }
     let ticks = ticks_until(&mut rig, off);

@@ -145,6 +145,7 @@ impl<S: Scalar> Bench<S> {
                     max_velocity_mm_s: 200.0,
                     max_acceleration_mm_s2: 2000.0,
                     travel: None,
+                    has_law: true,
                 };
                 let start = core::array::from_fn(|axis| self.rig.state.axes()[axis].reference());
                 self.planner = Some(StreamPlanner::new([limits; 3], 10, start));

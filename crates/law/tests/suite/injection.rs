@@ -198,7 +198,11 @@ fn nothing_else_begins_meanwhile_and_it_begins_only_at_rest() {
     let mut bench = bench();
     bench.begin(&request(false), &[0; 500]);
     bench.tick();
-    let view = bench.rig.stage.as_ref().view(&bench.rig.state);
+    let view = bench
+        .rig
+        .stage
+        .as_ref()
+        .view(&bench.rig.plan, &bench.rig.state);
     assert!(view.injecting && view.running);
     let jog = Command::Jog(
         AxisName::Y,

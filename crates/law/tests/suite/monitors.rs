@@ -63,7 +63,12 @@ fn an_output_below_the_level_is_no_reason_to_move_and_one_at_it_is() {
 fn ticks_of_unrest(jump: i32) -> u32 {
     let mut rig = Rig::<f32>::new(&StageSettings::simulated(), &Default::default());
     rig.stand();
-    let said = |rig: &Rig<f32>| refusal(rig.stage.as_ref().view(&rig.state), Command::Enable);
+    let said = |rig: &Rig<f32>| {
+        refusal(
+            rig.stage.as_ref().view(&rig.plan, &rig.state),
+            Command::Enable,
+        )
+    };
     assert_eq!(said(&rig), None);
     rig.inputs.readings[1].count = jump as u32;
     for ticks in 0..1000 {
@@ -86,7 +91,10 @@ fn ticks_refused(rig: &mut Rig<f32>, noise: &mut Noise, most: i64, speed: f64, t
         let count = start + speed * f64::from(tick) + sum as f64 / 12.0_f64.sqrt() / 3.0;
         rig.inputs.readings[0].count = (count.round() as i32).cast_unsigned();
         rig.tick();
-        let said = refusal(rig.stage.as_ref().view(&rig.state), Command::Enable);
+        let said = refusal(
+            rig.stage.as_ref().view(&rig.plan, &rig.state),
+            Command::Enable,
+        );
         refused += u32::from(said == Some(Refusal::NotAtStandstill(AxisName::X)));
     }
     refused

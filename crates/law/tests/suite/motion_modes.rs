@@ -113,6 +113,7 @@ fn stream(count: u32) -> Vec<[Segment; 3]> {
         max_velocity_mm_s: 100.0,
         max_acceleration_mm_s2: 2000.0,
         travel: None,
+        has_law: true,
     });
     let mut planner = StreamPlanner::new(limits, 10, [Position::ZERO; 3]);
     (1..=count)
@@ -231,9 +232,9 @@ fn an_underrun_brakes_and_latches_a_fault_or_holds_as_the_settings_say() {
 fn a_stop_forgets_a_stream_that_has_not_begun() {
     let mut rig = enabled(&StageSettings::simulated(), &PlanSettings::default());
     Feed::new(stream(500)).serve(&mut rig);
-    assert!(rig.stage.as_ref().view(&rig.state).stream_ready);
+    assert!(rig.stage.as_ref().view(&rig.plan, &rig.state).stream_ready);
     rig.command(Command::Stop);
-    assert!(!rig.stage.as_ref().view(&rig.state).stream_ready);
+    assert!(!rig.stage.as_ref().view(&rig.plan, &rig.state).stream_ready);
     assert!(rig.state.axes().iter().all(|axis| axis.wants_segment()));
 }
 
@@ -241,8 +242,10 @@ fn a_stop_forgets_a_stream_that_has_not_begun() {
 fn a_request_that_cannot_be_followed_is_refused_with_its_reason() {
     let mut rig = enabled(&StageSettings::simulated(), &sines());
     let refused = |rig: &Rig<f32>, command| {
-        let decision =
-            Supervisor::default().step(rig.stage.as_ref().view(&rig.state), Some(command));
+        let decision = Supervisor::default().step(
+            rig.stage.as_ref().view(&rig.plan, &rig.state),
+            Some(command),
+        );
         decision
             .events
             .into_iter()

@@ -7,11 +7,14 @@ use quadrant_law::axes::{AxisName, PerAxis};
 use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::reference::{MotionSettings, Segment};
 use quadrant_law::safety::{EnabledBy, SafetyState};
 use quadrant_law::supervisor::{Event, Supervisor};
-use quadrant_settings::{AxisSettings, StageSettings};
+use quadrant_settings::{AxisSettings, InjectionSettings, PlanSettings, StageSettings};
 
-use quadrant_test_support::Rig;
+use quadrant_test_support::{Rig, sine_on_x};
+
+use crate::injection::{Bench, request};
 
 const READY: StageView = StageView {
     safety: SafetyState::Disabled,
@@ -26,7 +29,11 @@ const READY: StageView = StageView {
     injection_ready: false,
     injecting: false,
     commissioned: false,
+    uncommissioned: None,
     inert: PerAxis::splat(false),
+    inert_planned: None,
+    inert_streamed: None,
+    inert_injected: None,
     brake_moves: false,
     enabled_by: EnabledBy::Any,
     locked: false,
@@ -72,10 +79,103 @@ fn an_axis_without_a_law_does_not_move_beside_one_that_is_commissioned() {
     };
     let motions = |axis| [Command::Home(axis), Command::StartMove(axis)];
     for command in motions(AxisName::Y) {
-        assert_eq!(refusal(view, command), Some(Refusal::NotCommissioned));
+        assert_eq!(refusal(view, command), Some(Refusal::NoLaw(AxisName::Y)));
     }
     for command in motions(AxisName::X) {
         assert_eq!(refusal(view, command), None);
+    }
+    let text = Refusal::NoLaw(AxisName::Y).to_string();
+    assert!(
+        text.starts_with("y: ") && text.contains("commission it"),
+        "{text}"
+    );
+}
+
+/// x is commissioned; y has no law.
+fn y_without_a_law() -> StageSettings {
+    let mut settings = StageSettings::simulated();
+    settings.axes[1] = AxisSettings::default();
+    settings
+}
+
+/// A plan that moves the axes of which `moves` is true.
+fn moving(moves: [bool; 3]) -> PlanSettings {
+    let sine = sine_on_x(1.0, 5.0).motions[0];
+    PlanSettings {
+        motions: moves.map(|moves| if moves { sine } else { MotionSettings::Hold }),
+    }
+}
+
+/// An enabled stage.
+fn enabled(settings: &StageSettings, plan: &PlanSettings) -> Rig<f32> {
+    let mut rig = Rig::new(settings, plan);
+    rig.tick();
+    assert!(rig.command(Command::Enable).enabled);
+    rig
+}
+
+#[test]
+fn a_plan_that_moves_an_axis_without_a_law_starts_nothing() {
+    for (moves, starts) in [
+        ([true, true, false], false),
+        ([false, true, false], false),
+        ([true, false, true], true),
+    ] {
+        let mut rig = enabled(&y_without_a_law(), &moving(moves));
+        let view = rig.stage.as_ref().view(&rig.plan, &rig.state);
+        let refused = refusal(view, Command::Run);
+        assert_eq!(
+            refused,
+            (!starts).then_some(Refusal::NoLaw(AxisName::Y)),
+            "{moves:?}"
+        );
+        rig.command(Command::Run);
+        assert_eq!(rig.state.is_running(), starts, "{moves:?}");
+    }
+}
+
+#[test]
+fn a_plan_that_began_before_its_axis_lost_its_law_does_not_begin_again() {
+    let plan = moving([true, true, false]);
+    let mut rig = enabled(&StageSettings::simulated(), &plan);
+    rig.exchange(&y_without_a_law());
+    rig.command(Command::Run);
+    assert!(!rig.state.is_running());
+}
+
+#[test]
+fn a_stream_whose_first_segment_moves_an_axis_without_a_law_starts_nothing() {
+    let still = Segment {
+        ticks: 100,
+        first: true,
+        ..Segment::default()
+    };
+    let moving = Segment {
+        differences: [1 << 64, 0, 0, 0, 0],
+        ..still
+    };
+    for (of_y, starts) in [(moving, false), (still, true)] {
+        let mut rig = enabled(&y_without_a_law(), &PlanSettings::default());
+        for (axis, segment) in AxisName::ALL.into_iter().zip([moving, of_y, still]) {
+            rig.state.offer_segment(axis, &segment);
+        }
+        rig.command(Command::StartStream);
+        assert_eq!(rig.state.is_running(), starts, "{of_y:?}");
+    }
+}
+
+#[test]
+fn an_injection_starts_no_plan_that_moves_an_axis_without_a_law() {
+    for (with_plan, starts) in [(true, false), (false, true)] {
+        let plan = moving([true, true, false]);
+        let mut bench = Bench::<f32>::new(&y_without_a_law(), &plan);
+        let request = InjectionSettings {
+            with_plan,
+            ..request(false)
+        };
+        bench.begin(&request, &[0; 20]);
+        bench.tick();
+        assert_eq!(bench.rig.state.is_running(), starts, "{with_plan}");
     }
 }
 
@@ -143,6 +243,10 @@ fn one_axis_with_a_law_that_was_not_commissioned_keeps_the_outputs_off() {
         drive(&mut settings.axes[2]);
         let mut rig = Rig::<f32>::new(&settings, &Default::default());
         rig.tick();
+        let view = rig.stage.as_ref().view(&rig.plan, &rig.state);
+        let named = Refusal::LawNotCommissioned(AxisName::Z);
+        assert_eq!(refusal(view, Command::Enable), Some(named));
+        assert_eq!(settings.uncommissioned(), Some(AxisName::Z));
         assert!(!rig.command(Command::Enable).enabled);
         assert!(!rig.tick().enabled);
     }

@@ -174,7 +174,7 @@ fn an_axis_that_moves_is_not_enabled() {
             }
             let view = StageView {
                 commissioned: true,
-                ..rig.stage.as_ref().view(&rig.state)
+                ..rig.stage.as_ref().view(&rig.plan, &rig.state)
             };
             let said = refusal(view, Command::Enable);
             assert_eq!(said, Some(Refusal::NotAtStandstill(axis)));
@@ -187,12 +187,15 @@ fn an_axis_that_moves_is_not_enabled() {
                 rig.tick();
             }
             assert_eq!(
-                refusal(rig.stage.as_ref().view(&rig.state), Command::Enable),
+                refusal(
+                    rig.stage.as_ref().view(&rig.plan, &rig.state),
+                    Command::Enable
+                ),
                 None
             );
             assert!(rig.command(Command::Enable).enabled);
             // Driven, it may move.
-            assert_eq!(rig.stage.as_ref().view(&rig.state).moving, None);
+            assert_eq!(rig.stage.as_ref().view(&rig.plan, &rig.state).moving, None);
         }
     }
 }
@@ -306,7 +309,8 @@ fn until_it_is_homed_an_axis_is_slow_and_starts_nothing_but_jogs_and_homing() {
     let mut rig = Rig::<f32>::new(&settings, &quadrant_test_support::sine_on_x(1.0, 10.0));
     rig.tick();
     rig.command(Command::Enable);
-    let said = |rig: &Rig<f32>, command| refusal(rig.stage.as_ref().view(&rig.state), command);
+    let said =
+        |rig: &Rig<f32>, command| refusal(rig.stage.as_ref().view(&rig.plan, &rig.state), command);
     let not_homed = Some(Refusal::NotHomed(AxisName::X));
     for command in [
         Command::Run,

@@ -60,6 +60,14 @@ impl AxisSettings {
         };
         let filters = feedback.filters.as_deref().unwrap_or_default();
         for gains in feedback.linear_gains() {
+            let has_gain =
+                [gains.kp_v_per_mm, gains.ki_v_per_mm_s, gains.kd_v_s_per_mm] != [0.0; 3];
+            match (has_gain, self.commissioned) {
+                (true, _) => {}
+                // No loop is closed: the plant was identified first.
+                (false, false) => continue,
+                (false, true) => return at.refuse(linear, 0.0, Reason::NoGain),
+            }
             let bound = filtered_sector_bound(plant, &gains, filters, period_s);
             if bound <= 1.0 {
                 return at.refuse(linear, gains.kp_v_per_mm, Reason::Unstable);

@@ -299,6 +299,24 @@ fn a_gain_that_is_too_high_is_blamed_and_not_the_nonlinear_gain_upon_it() {
 }
 
 #[test]
+fn a_plant_may_be_known_before_the_law_has_gains_but_no_axis_is_commissioned_without_any() {
+    let plant = StageSettings::simulated().axes[0].plant;
+    let mut settings = StageSettings::default();
+    settings.axes[0].plant = plant;
+    assert_eq!(settings.validate(ROOM), Ok(()));
+    let (field, reason_given, text) = reason(|axis| {
+        *axis = quadrant_settings::AxisSettings {
+            commissioned: true,
+            plant,
+            ..StageSettings::default().axes[0].clone()
+        };
+    });
+    assert_eq!(field, "feedback.pid.kp_v_per_mm", "{text}");
+    assert_eq!(reason_given, Reason::NoGain);
+    assert!(text.contains("`quadrant design pid`"), "{text}");
+}
+
+#[test]
 fn points_that_do_not_rise_are_refused() {
     let (field, reason_given, _) = reason(|axis| {
         let schedule = axis.feedback.schedule.as_mut().expect("by default");

@@ -27,6 +27,7 @@ pub(crate) const LIMITS: StreamLimits = StreamLimits {
     max_velocity_mm_s: 200.0,
     max_acceleration_mm_s2: 2000.0,
     travel: None,
+    has_law: true,
 };
 
 pub(crate) fn mm(value: f64) -> Position {

@@ -85,3 +85,23 @@ fn a_refusal_is_an_error_like_any_other() {
             .contains("set point 3: it ends the stream, and z still moves")
     );
 }
+
+#[test]
+fn a_set_point_that_moves_an_axis_without_a_law_is_refused() {
+    let mut settings = quadrant_settings::StageSettings::simulated();
+    settings.axes[0] = quadrant_settings::AxisSettings::default();
+    let limits = settings.stream_limits([false; 3]);
+    let mut planner = StreamPlanner::new(limits, 10, [Position::ZERO; 3]);
+    planner
+        .plan(&on_x(1, AxisPoint::default()))
+        .expect("at rest");
+    let error = planner
+        .plan(&on_x(2, point(1e-6, 0.0, 0.0)))
+        .expect_err("x has no law");
+    assert_eq!(error.flaw, StreamFlaw::NoLaw { axis: AxisName::X });
+    let text = error.to_string();
+    assert!(
+        text.starts_with("set point 2: x: ") && text.contains("no law"),
+        "{text}"
+    );
+}
