@@ -113,6 +113,18 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         }
     }
 
+    /// Shifts the feedback's reference of an axis that is led in the next tick.
+    pub(super) fn shift_reference(&mut self, name: AxisName, by: Position) {
+        let stage = stage_of(&self.axes, &self.operation);
+        stage.shift_reference(&mut self.state, name, by);
+    }
+
+    /// Reacts to a fault that a planner of the board's has found in an axis that it leads, before a tick.
+    pub(super) fn report_fault(&mut self, name: AxisName, code: FaultCode) {
+        let stage = stage_of(&self.axes, &self.operation);
+        stage.report_fault(&mut self.state, name, code);
+    }
+
     /// Ends [`lead`](Self::lead): a plan of a host moves the axis again.
     pub fn release(&mut self, name: AxisName) {
         self.plan[name] = Motion::Hold;

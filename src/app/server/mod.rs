@@ -80,6 +80,8 @@ pub struct ServerParts<'q, 'a, S: Scalar, F> {
     pub cycle_hz: u32,
     /// Control rates that the board is up to, Hz: the lowest and the highest.
     pub rates_hz: (f64, f64),
+    /// The axes whose steps of another control the board counts.
+    pub pulse_axes: [bool; 3],
     /// The number type of the control law.
     pub number: NumberType,
 }
@@ -131,6 +133,7 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     board: &'static str,
     cycle_hz: u32,
     rates_hz: (f64, f64),
+    pulse_axes: [bool; 3],
     number: NumberType,
     reboot: bool,
     /// Orders sent to control so far; wraps.
@@ -186,6 +189,7 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
             board: parts.board,
             cycle_hz: parts.cycle_hz,
             rates_hz: parts.rates_hz,
+            pulse_axes: parts.pulse_axes,
             number: parts.number,
             reboot: false,
             orders: 0,

@@ -26,7 +26,8 @@ pub use motion::{Motion, MotionSettings};
 pub use motion_state::MotionState;
 pub use point_to_point::{PointToPoint, PointToPointSettings};
 pub use pulses::{
-    MAX_PULSE_DELAY_TICKS, MAX_PULSE_WAIT_TICKS, PulseReference, PulseScale, PulseState,
+    FollowedPulses, MAX_PULSE_DELAY_TICKS, MAX_PULSE_WAIT_TICKS, PulseReference, PulseScale,
+    PulseState,
 };
 pub use ramp::{Ramp, RampState, Velocity, steps_per_mm};
 pub use recorded::RecordedTable;

@@ -11,9 +11,15 @@
 //! negative: steps in one sense never make a velocity in the other, so friction's sense of motion turns when the pulses turn, and only
 //! then. A fit of a parabola and an observer turn it more often at the same delay; `quadrant-studies step-direction` compares them.
 //!
+//! A mean over a curved path lies on its inner side: a circle of radius `R` at a feed `v` becomes smaller by `v² D² / 12 R` with a
+//! delay `D`. The acceleration is known from the same averages, so the feedback's reference is put back by
+//! `a D (D + 2T) / 12`. It lags the feedforward's by the axis' preview, over twice which the correction is averaged: steps
+//! do not make it jump, and what two steps explain is not corrected: up to a sixth of one is left. The feedforward's reference is left as it is.
+//!
 //! Sums are of integers: there is no drift, and an axis comes to rest where the sum of the pulses says.
 
 use super::sample::{MotionScale, ReferenceSample};
+use crate::axis::MAX_PREVIEW_TICKS;
 use crate::hint::cold_path;
 use crate::rounding;
 use crate::safety::FaultCode;
@@ -26,6 +32,13 @@ pub const MAX_PULSE_DELAY_TICKS: u32 = 239;
 const ROOM: usize = 512;
 /// Longest wait beside the delay, ticks: what is left of the room.
 pub const MAX_PULSE_WAIT_TICKS: u32 = ROOM as u32 - 1 - 2 * (MAX_PULSE_DELAY_TICKS + 1);
+/// Room for past velocities: twice the longest preview, and more; a power of two.
+const SUMS_ROOM: usize = 64;
+const _: () = assert!(2 * MAX_PREVIEW_TICKS + 1 < SUMS_ROOM);
+/// Steps by which the two averages differ on a slow reversal, only because the count is a staircase.
+const UNCERTAIN_STEPS: u32 = 2;
+/// Fraction bits of the correction's factor.
+const CORRECTION_BITS: u32 = 16;
 /// Most steps of a tick: the sums fit 32 bits.
 const MOST_STEPS: f64 = 30_000.0;
 /// Fraction bits of the position below its unit.
@@ -46,6 +59,8 @@ pub struct PulseScale {
     pub delay_ticks: u32,
     /// Delay besides, ticks, up to [`MAX_PULSE_WAIT_TICKS`]: that of an axis whose preview is shorter than another's.
     pub wait_ticks: u32,
+    /// Preview of the axis, ticks.
+    pub preview_ticks: u32,
     /// Largest velocity, mm/s.
     pub max_velocity_mm_s: f64,
     /// Largest acceleration of the axis, mm/s²; pulses may have four times that.
@@ -68,6 +83,21 @@ pub struct PulseReference<S: Scalar> {
     units: i64,
     velocity: S::Gain,
     acceleration: S::Gain,
+    /// Ticks over which the correction is averaged.
+    averaged: usize,
+    /// Change of the velocity's sum over them that the staircase has by itself.
+    uncertain: i32,
+    /// Position units for the velocity's change over them, 2^-16.
+    correction: i64,
+}
+
+/// The reference of a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FollowedPulses<S> {
+    /// The reference after the preview.
+    pub ahead: ReferenceSample<S>,
+    /// Distance to the path from the feedback's reference, which is the former of the preview ago.
+    pub correction: Position,
 }
 
 /// The memory of a pulse train.
@@ -83,6 +113,7 @@ pub struct PulseState {
     /// Their sum weighed by the triangle: the velocity in `1 / n²` steps per tick.
     sum: i32,
     steps: [i16; ROOM],
+    sums: [i32; SUMS_ROOM],
     place: usize,
 }
 
@@ -96,6 +127,7 @@ impl Default for PulseState {
             older: 0,
             sum: 0,
             steps: [0; ROOM],
+            sums: [0; SUMS_ROOM],
             place: 0,
         }
     }
@@ -104,11 +136,22 @@ impl Default for PulseState {
 impl PulseState {
     /// Begins at rest: `count` is the counter's, `position` that of the reference.
     pub fn start(&mut self, count: u32, position: Position) {
-        *self = Self {
-            count,
-            position,
-            ..Self::default()
-        };
+        // Field by field: a whole memory, made apart and copied, takes half a tick longer.
+        let Self {
+            count: at,
+            position: here,
+            fraction,
+            newer,
+            older,
+            sum,
+            steps,
+            sums,
+            place,
+        } = self;
+        (*at, *here) = (count, position);
+        (*fraction, *newer, *older, *sum, *place) = (0, 0, 0, 0, 0);
+        steps.fill(0);
+        sums.fill(0);
     }
 
     /// Position of the reference.
@@ -133,6 +176,8 @@ impl<S: Scalar> PulseReference<S> {
         let most = pulses.max_velocity_mm_s / rate * per_mm;
         let change = ACCELERATION_RATIO * pulses.max_acceleration_mm_s2 / (rate * rate) * per_mm;
         let units = step_mm / scale.resolution_mm * POSITION_UNITS_PER_COUNT / weight;
+        let averaged = 2 * pulses.preview_ticks.min(MAX_PREVIEW_TICKS as u32) + 1;
+        let correction = units * (weight - 1.0) / (-12.0 * f64::from(averaged));
         // `as` saturates.
         let whole = |value: f64| rounding::ceil(value) as u32;
         Self {
@@ -154,6 +199,9 @@ impl<S: Scalar> PulseReference<S> {
                 Quantity::Integer,
                 Quantity::Acceleration,
             ),
+            averaged: averaged as usize,
+            uncertain: (UNCERTAIN_STEPS * averaged) as i32,
+            correction: rounding::round(libm::scalbn(correction, CORRECTION_BITS as i32)) as i64,
         }
     }
 
@@ -168,11 +216,7 @@ impl<S: Scalar> PulseReference<S> {
     /// [`FaultCode::PulseJump`]: more steps than twice the largest velocity has, or a speed that changes by more than four times the
     /// largest acceleration. [`FaultCode::PulseOverspeed`]: a mean speed above the largest. The memory is as before then.
     #[inline(never)]
-    pub fn step(
-        &self,
-        state: &mut PulseState,
-        count: u32,
-    ) -> Result<ReferenceSample<S>, FaultCode> {
+    pub fn step(&self, state: &mut PulseState, count: u32) -> Result<FollowedPulses<S>, FaultCode> {
         let moved = count.wrapping_sub(state.count);
         let steps = ((moved << self.unused_bits) as i32) >> self.unused_bits;
         if steps.unsigned_abs() > self.most_steps {
@@ -212,10 +256,17 @@ impl<S: Scalar> PulseReference<S> {
         state.position = state
             .position
             .saturating_add(Position(way >> FRACTION_BITS));
-        Ok(ReferenceSample {
-            position: state.position,
-            velocity: S::scale_integer(sum, self.velocity),
-            acceleration: S::scale_integer(change, self.acceleration),
+        let before = state.sums[place.wrapping_sub(self.averaged) % SUMS_ROOM];
+        state.sums[place % SUMS_ROOM] = sum;
+        let bend = sum.wrapping_sub(before);
+        let known = bend - bend.clamp(-self.uncertain, self.uncertain);
+        Ok(FollowedPulses {
+            ahead: ReferenceSample {
+                position: state.position,
+                velocity: S::scale_integer(sum, self.velocity),
+                acceleration: S::scale_integer(change, self.acceleration),
+            },
+            correction: Position(i64::from(known).wrapping_mul(self.correction) >> CORRECTION_BITS),
         })
     }
 }

@@ -20,6 +20,7 @@ const PULSES: PulseScale = PulseScale {
     counter_bits: 32,
     delay_ticks: 63,
     wait_ticks: 0,
+    preview_ticks: 12,
     max_velocity_mm_s: 250.0,
     max_acceleration_mm_s2: 2000.0,
 };
@@ -32,11 +33,11 @@ fn samples<S: Scalar>(
 ) -> Vec<ReferenceSample<S>> {
     let reference = PulseReference::<S>::new(pulses, scale);
     let mut state = PulseState::default();
-    let step = |count| reference.step(&mut state, count);
+    let step = |count| Ok(reference.step(&mut state, count)?.ahead);
     counts
         .into_iter()
         .map(step)
-        .collect::<Result<_, _>>()
+        .collect::<Result<_, FaultCode>>()
         .unwrap()
 }
 
@@ -147,6 +148,35 @@ fn an_axis_at_rest_on_the_edge_of_a_step_moves_by_no_more_than_it() {
     for sample in &seen[200..] {
         assert!((0.0..=0.01).contains(&sample.position.to_mm(5e-4)));
         assert!(sample.velocity.abs() < 0.2, "{sample:?}");
+    }
+}
+
+#[test]
+fn the_correction_leads_back_to_a_curved_path_and_is_none_at_rest() {
+    for (delay_ticks, step_mm) in [(63, 1e-3), (239, 5e-3)] {
+        let pulses = PulseScale {
+            delay_ticks,
+            step_mm,
+            ..PULSES
+        };
+        // A radius of 10 mm at 80 mm/s.
+        let path = |t: f64| 10.0 * (1.0 - (8.0 * t).cos());
+        let reference = PulseReference::<f32>::new(&pulses, SCALE);
+        let mut state = PulseState::default();
+        let lag = (delay_ticks + pulses.preview_ticks) as usize;
+        let mut ahead = vec![];
+        for (tick, count) in followed(step_mm, 7854, path).enumerate() {
+            let found = reference.step(&mut state, count).unwrap();
+            ahead.push(found.ahead.position);
+            if (1000..7854).contains(&tick) {
+                let now = ahead[tick - 12] + found.correction;
+                let error = now.to_mm(5e-4) - path((tick - lag) as f64 / SCALE.rate_hz);
+                // Without it, 2 and 30 um.
+                assert!(error.abs() < 0.2 * step_mm + 4e-4, "{delay_ticks}: {error}");
+            }
+        }
+        let at_rest = reference.step(&mut state, count_of(step_mm, path(7854.0 / SCALE.rate_hz)));
+        assert_eq!(at_rest.unwrap().correction, Position::ZERO);
     }
 }
 
@@ -291,10 +321,11 @@ proptest! {
         counter_bits in 0_u32..40,
         delay_ticks in any::<u32>(),
         wait_ticks in any::<u32>(),
+        preview_ticks in any::<u32>(),
         max_velocity_mm_s in prop_oneof![0.0_f64..1e9, Just(f64::INFINITY)],
     ) {
         let pulses = PulseScale {
-            step_mm, counter_bits, delay_ticks, wait_ticks, max_velocity_mm_s,
+            step_mm, counter_bits, delay_ticks, wait_ticks, preview_ticks, max_velocity_mm_s,
             max_acceleration_mm_s2: max_velocity_mm_s,
         };
         let reference = PulseReference::<f32>::new(&pulses, SCALE);
