@@ -28,8 +28,7 @@ pub struct PulseControl {
 }
 
 impl PulseControl {
-    /// grbl and its descendants: a timer of 100 kHz that interrupts delay, and segments of 10 ms. Chosen, after grbl's
-    /// `ACCELERATION_TICKS_PER_SECOND`.
+    /// grbl and its descendants: a timer of 100 kHz that interrupts delay, and a hundred segments a second. Chosen.
     pub const GRBL: Self = Self {
         name: "grbl, 100 kHz",
         period_s: 10e-6,

@@ -67,11 +67,15 @@ impl<P: Pulses> PulseLead<P> {
     /// in it.
     #[inline(never)]
     pub fn step<S: Scalar>(&mut self, control: &mut Control<'_, '_, S>) -> Option<Command> {
+        let stage = control.stage();
+        let follows =
+            PerAxis::from_fn(|name| P::AXES[name as usize] && stage.axes[name].pulses().is_some());
+        if !follows.contains(&true) {
+            return None;
+        }
         let seen = self.lines.read();
-        let mut any = false;
         for name in AxisName::ALL {
-            if P::AXES[name as usize] && control.stage().axes[name].pulses().is_some() {
-                any = true;
+            if follows[name] {
                 self.follow(control, name, &seen);
             } else {
                 self.holds[name] = Hold::Released;
@@ -89,11 +93,11 @@ impl<P: Pulses> PulseLead<P> {
             Some(_) => {
                 self.is_on = false;
                 self.enabling = 0;
-                return (any && safety.drives()).then_some(Command::Disable);
+                return safety.drives().then_some(Command::Disable);
             }
             None => {}
         }
-        if !(any && self.is_on) {
+        if !self.is_on {
             return None;
         }
         if self.enabling > 0 {
@@ -106,7 +110,7 @@ impl<P: Pulses> PulseLead<P> {
             }
         }
         if safety.is_enabled() {
-            return self.take_hold(control, &seen);
+            return self.take_hold(control, follows, &seen);
         }
         None
     }
@@ -158,6 +162,7 @@ impl<P: Pulses> PulseLead<P> {
     fn take_hold<S: Scalar>(
         &mut self,
         control: &mut Control<'_, '_, S>,
+        follows: PerAxis<bool>,
         seen: &PulseReadings,
     ) -> Option<Command> {
         for name in AxisName::ALL {
@@ -165,8 +170,7 @@ impl<P: Pulses> PulseLead<P> {
             let state = &control.state().axes()[name];
             let command = Command::StartMove(name);
             if self.holds[name] != Hold::Released
-                || !P::AXES[name as usize]
-                || axis.pulses().is_none()
+                || !follows[name]
                 || axis.commissioning() != Commissioning::Done
                 || state.mode() != MotionMode::Hold
                 || admission::refusal(control.stage().view(control.state()), command).is_some()

@@ -127,6 +127,29 @@ fn a_motion_is_followed_by_the_delay_to_a_fraction_of_a_step() {
 }
 
 #[test]
+fn half_a_million_steps_a_second_are_followed() {
+    for rate_hz in [10e3, 1e3] {
+        let scale = MotionScale { rate_hz, ..SCALE };
+        let pulses = PulseScale {
+            step_mm: 5e-4,
+            delay_ticks: 9,
+            ..PULSES
+        };
+        // To 249 mm/s within 0.2 s.
+        let path = |t: f64| 622.5 * t.min(0.2) * t.min(0.2) + 249.0 * (t - 0.2).max(0.0);
+        let counts = (0..rate_hz as usize).map(|tick| count_of(5e-4, path(tick as f64 / rate_hz)));
+        let seen = samples::<f32>(&pulses, scale, counts);
+        let last = seen.last().unwrap();
+        let there = path((rate_hz - 10.0) / rate_hz);
+        assert!(
+            (last.position.to_mm(5e-4) - there).abs() < 5e-4,
+            "{last:?} {there}"
+        );
+        assert!((last.velocity - 249.0).abs() < 0.5, "{last:?}");
+    }
+}
+
+#[test]
 fn a_step_every_fifty_ticks_is_a_motion_that_does_not_stop() {
     let pulses = PulseScale {
         delay_ticks: 149,
