@@ -2,14 +2,18 @@
 
 use quadrant::app::{Axis, Control, Inputs, PulseLead, Queues};
 use quadrant::hal::{PulseReadings, Pulses};
+use quadrant_fault_bench::tasks::Tasks;
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::motion::MotionMode;
 use quadrant_law::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
 use quadrant_law::stage::Outputs;
 use quadrant_law::units::Position;
+use quadrant_link::message::{Body, LinkError, SettingsRequest};
 use quadrant_settings::{PlanSettings, PulseSettings, StageSettings};
 use quadrant_sim::plant::{SimulatedStage, StageParameters};
+
+use crate::preemption::set;
 
 const STEP_MM: f64 = 5e-3;
 /// Distance to the reference of an axis that steps have stopped at once: it creeps into its place.
@@ -276,6 +280,27 @@ fn without_the_setting_the_lines_do_nothing() {
     rig.run(100);
     rig.switch(true);
     assert!(!rig.outputs.enabled && !rig.alarm());
+}
+
+#[test]
+fn a_board_that_counts_no_steps_for_an_axis_refuses_its_pulses_by_name() {
+    let given = settings();
+    for (axis, counted) in [("x", true), ("y", false)] {
+        let mut tasks = Tasks::new(&StageSettings::simulated(), 1);
+        for leaf in ["", "/step_mm"] {
+            let path = format!("/axes/{axis}/pulses{leaf}");
+            tasks.ask(set(&path, &given)).expect("a setting");
+        }
+        let answer = tasks.ask(Body::Settings(SettingsRequest::Apply));
+        let Err(LinkError::Invalid(text)) = &answer else {
+            assert!(counted && answer.is_ok(), "{axis}: {answer:?}");
+            continue;
+        };
+        assert!(
+            !counted && text.starts_with("y/pulses: this board counts no steps"),
+            "{text}"
+        );
+    }
 }
 
 #[test]
