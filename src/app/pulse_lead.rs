@@ -58,11 +58,6 @@ impl<P: Pulses> PulseLead<P> {
         }
     }
 
-    /// The lines.
-    pub fn lines_mut(&mut self) -> &mut P {
-        &mut self.lines
-    }
-
     /// Reads the lines and moves the references of the axes that follow, before a tick; returns the command that the lines bring about
     /// in it.
     #[inline(never)]

@@ -1,5 +1,8 @@
 //! Axes that another control leads by step and direction, and switches by its line.
 
+use std::cell::RefCell;
+use std::rc::Rc;
+
 use quadrant::app::{Axis, Control, Inputs, PulseLead, Queues};
 use quadrant::hal::{PulseReadings, Pulses};
 use quadrant_fault_bench::tasks::Tasks;
@@ -26,22 +29,26 @@ struct Lines {
     alarm: bool,
 }
 
-impl Pulses for Lines {
+/// The end of the lines at the board.
+struct BoardEnd(Rc<RefCell<Lines>>);
+
+impl Pulses for BoardEnd {
     const AXES: [bool; 3] = [true, true, false];
 
     fn read(&mut self) -> PulseReadings {
-        self.seen
+        self.0.borrow().seen
     }
 
     fn set_alarm(&mut self, alarm: bool) {
-        self.alarm = alarm;
+        self.0.borrow_mut().alarm = alarm;
     }
 }
 
 /// The fast half behind those lines, on the simulated stage.
 struct Rig {
     control: Control<'static, 'static, f32>,
-    lead: PulseLead<Lines>,
+    lead: PulseLead<BoardEnd>,
+    lines: Rc<RefCell<Lines>>,
     stage: SimulatedStage,
     outputs: Outputs,
     switches: Switches,
@@ -65,9 +72,11 @@ impl Rig {
         let axes = axes.map(|axis| -> &'static mut Axis<f32> { Box::leak(Box::new(axis)) });
         let queues: &'static mut Queues<'static, f32> = Box::leak(Box::new(Queues::new()));
         let (ends, ..) = queues.split();
+        let lines: Rc<RefCell<Lines>> = Rc::default();
         Self {
             control: Control::new(axes, operation, plan, settings.rate_hz as u32, ends),
-            lead: PulseLead::new(Lines::default()),
+            lead: PulseLead::new(BoardEnd(Rc::clone(&lines))),
+            lines,
             stage: SimulatedStage::new(&StageParameters::ideal(), settings.rate_hz, 1),
             outputs: Outputs::default(),
             switches: Switches::NONE,
@@ -103,22 +112,22 @@ impl Rig {
 
     /// Makes steps of x, evenly over some ticks.
     fn step(&mut self, steps: i32, ticks: i32) {
-        let from = self.lead.lines_mut().seen.counts[0];
+        let from = self.lines.borrow_mut().seen.counts[0];
         for tick in 1..=ticks {
             let made = steps * tick / ticks;
-            self.lead.lines_mut().seen.counts[0] = from.wrapping_add_signed(made);
+            self.lines.borrow_mut().seen.counts[0] = from.wrapping_add_signed(made);
             self.tick(None);
         }
     }
 
     /// Sets the line SERVO ON, and waits.
     fn switch(&mut self, on: bool) {
-        self.lead.lines_mut().seen.servo_on = on;
+        self.lines.borrow_mut().seen.servo_on = on;
         self.run(100);
     }
 
-    fn alarm(&mut self) -> bool {
-        self.lead.lines_mut().alarm
+    fn alarm(&self) -> bool {
+        self.lines.borrow().alarm
     }
 
     fn mode(&self) -> MotionMode {
@@ -144,7 +153,7 @@ impl Rig {
 fn an_axis_follows_the_steps_from_where_it_stands_when_the_line_comes_on() {
     let mut rig = Rig::new(&settings());
     // What is counted before does not matter.
-    rig.lead.lines_mut().seen.counts = [123_456, 7, 0];
+    rig.lines.borrow_mut().seen.counts = [123_456, 7, 0];
     rig.run(100);
     rig.step(-200, 100);
     assert!(!rig.outputs.enabled);
@@ -173,7 +182,7 @@ fn the_line_switches_off_at_once_and_a_second_time_counts_from_there() {
     let mut rig = Rig::following();
     rig.step(400, 4000);
     rig.run(500);
-    rig.lead.lines_mut().seen.servo_on = false;
+    rig.lines.borrow_mut().seen.servo_on = false;
     rig.tick(None);
     assert!(!rig.outputs.enabled);
     rig.step(1000, 100);
@@ -192,7 +201,7 @@ fn a_line_that_is_on_since_the_start_or_flickers_switches_nothing_on() {
     rig.switch(true);
     assert!(!rig.outputs.enabled);
     for tick in 0..2000 {
-        rig.lead.lines_mut().seen.servo_on = tick % 31 != 0;
+        rig.lines.borrow_mut().seen.servo_on = tick % 31 != 0;
         rig.tick(None);
         assert!(!rig.outputs.enabled);
     }
@@ -203,14 +212,13 @@ fn steps_that_jump_or_are_lost_brake_the_axis_and_raise_the_alarm_until_the_line
     for lost in [false, true] {
         let mut rig = Rig::following();
         rig.step(400, 4000);
-        let lines = rig.lead.lines_mut();
         if lost {
-            lines.seen.lost[0] = true;
+            rig.lines.borrow_mut().seen.lost[0] = true;
         } else {
-            lines.seen.counts[0] += 500;
+            rig.lines.borrow_mut().seen.counts[0] += 500;
         }
         rig.tick(None);
-        rig.lead.lines_mut().seen.lost[0] = false;
+        rig.lines.borrow_mut().seen.lost[0] = false;
         assert_eq!(rig.fault(), Some(FaultCode::PulseJump));
         assert_eq!(rig.mode(), MotionMode::Stopping);
         assert!(rig.outputs.enabled, "it brakes");
@@ -233,11 +241,11 @@ fn steps_that_jump_or_are_lost_brake_the_axis_and_raise_the_alarm_until_the_line
 fn steps_faster_than_the_axis_are_an_overspeed() {
     let mut rig = Rig::following();
     // To 300 mm/s within 0.3 s: the limit is 250.
-    let from = rig.lead.lines_mut().seen.counts[0];
+    let from = rig.lines.borrow_mut().seen.counts[0];
     for tick in 0..3000 {
         let time_s = f64::from(tick) * 1e-4;
         let steps = (500.0 * time_s * time_s / STEP_MM) as u32;
-        rig.lead.lines_mut().seen.counts[0] = from.wrapping_add(steps);
+        rig.lines.borrow_mut().seen.counts[0] = from.wrapping_add(steps);
         rig.tick(None);
     }
     assert_eq!(rig.fault(), Some(FaultCode::PulseOverspeed));

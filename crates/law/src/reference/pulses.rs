@@ -11,10 +11,11 @@
 //! negative: steps in one sense never make a velocity in the other, so friction's sense of motion turns when the pulses turn, and only
 //! then. A fit of a parabola and an observer turn it more often at the same delay; `quadrant-studies step-direction` compares them.
 //!
-//! A mean over a curved path lies on its inner side: a circle of radius `R` at a feed `v` becomes smaller by `v² D² / 12 R` with a
-//! delay `D`. The acceleration is known from the same averages, so the feedback's reference is put back by
-//! `a D (D + 2T) / 12`. It lags the feedforward's by the axis' preview, over twice which the correction is averaged: steps
-//! do not make it jump, and what two steps explain is not corrected: up to a sixth of one is left. The feedforward's reference is left as it is.
+//! A mean over a curved path lies on its inner side: with a delay `D`, a circle of radius `R` at a feed `v` becomes smaller by
+//! `v² D² / 12 R`. The acceleration `a` is known from the same averages, so the feedback's reference is put back by
+//! `a D (D + 2T) / 12`, `T` being the control period. It lags the feedforward's by the axis' preview, and the correction is a mean over
+//! twice that, so that no step makes it jump. What two steps explain is not corrected: up to a sixth of a step is left. The
+//! feedforward's reference is left as it is.
 //!
 //! Sums are of integers: there is no drift, and an axis comes to rest where the sum of the pulses says.
 
@@ -86,7 +87,7 @@ pub struct PulseReference<S: Scalar> {
     /// Ticks over which the correction is averaged.
     averaged: usize,
     /// Change of the velocity's sum over them that the staircase has by itself.
-    uncertain: i32,
+    uncertain: u32,
     /// Position units for the velocity's change over them, 2^-16.
     correction: i64,
 }
@@ -153,16 +154,6 @@ impl PulseState {
         steps.fill(0);
         sums.fill(0);
     }
-
-    /// Position of the reference.
-    pub const fn position(&self) -> Position {
-        self.position
-    }
-
-    /// True if pulses came of late, whose way the reference has not gone to its end.
-    pub const fn is_moving(&self) -> bool {
-        self.sum != 0
-    }
 }
 
 impl<S: Scalar> PulseReference<S> {
@@ -200,14 +191,9 @@ impl<S: Scalar> PulseReference<S> {
                 Quantity::Acceleration,
             ),
             averaged: averaged as usize,
-            uncertain: (UNCERTAIN_STEPS * averaged) as i32,
+            uncertain: UNCERTAIN_STEPS * averaged,
             correction: rounding::round(libm::scalbn(correction, CORRECTION_BITS as i32)) as i64,
         }
-    }
-
-    /// Ticks by which the reference follows the pulses.
-    pub const fn delay_ticks(&self) -> usize {
-        self.length - 1 + self.wait
     }
 
     /// The reference of the next tick, from the counter's count in it.
@@ -259,14 +245,15 @@ impl<S: Scalar> PulseReference<S> {
         let before = state.sums[place.wrapping_sub(self.averaged) % SUMS_ROOM];
         state.sums[place % SUMS_ROOM] = sum;
         let bend = sum.wrapping_sub(before);
-        let known = bend - bend.clamp(-self.uncertain, self.uncertain);
+        let beyond = bend.unsigned_abs().saturating_sub(self.uncertain);
+        let known = i64::from(beyond) * i64::from(bend.signum());
         Ok(FollowedPulses {
             ahead: ReferenceSample {
                 position: state.position,
                 velocity: S::scale_integer(sum, self.velocity),
                 acceleration: S::scale_integer(change, self.acceleration),
             },
-            correction: Position(i64::from(known).wrapping_mul(self.correction) >> CORRECTION_BITS),
+            correction: Position(known.wrapping_mul(self.correction) >> CORRECTION_BITS),
         })
     }
 }
