@@ -42,6 +42,29 @@ pub trait Switches {
     fn read(&mut self) -> safety::Switches;
 }
 
+/// What another control puts in by step and direction, in one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PulseReadings {
+    /// Steps so far of each axis, 32 bits wide and wrapping; they count backwards while the direction line is on.
+    pub counts: [u32; 3],
+    /// The axes of which steps may have been lost since the last tick.
+    pub lost: [bool; 3],
+    /// The line SERVO ON: the control wants its axes driven.
+    pub servo_on: bool,
+}
+
+/// The lines of another control that leads axes by step and direction.
+pub trait Pulses {
+    /// The axes whose steps the board counts: x, y, z.
+    const AXES: [bool; 3];
+
+    /// Reads all of them; to be called once a tick. A broken wire of SERVO ON reads as off.
+    fn read(&mut self) -> PulseReadings;
+
+    /// Sets the line ALARM. It shows an alarm by itself while the processor is in reset.
+    fn set_alarm(&mut self, alarm: bool);
+}
+
 /// A serial port that never waits.
 pub trait Serial {
     /// Takes what has arrived, as much as `into` holds; returns how many bytes that was.

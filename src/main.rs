@@ -63,7 +63,7 @@ mod app {
     use quadrant_link::message::NumberType;
 
     use crate::board::{
-        self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, SettingsFlash,
+        self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Pulses, Serial, SettingsFlash,
         Switches, Tick, Watchdog,
     };
     use crate::boot::{self, StaticStorage};
@@ -113,6 +113,7 @@ mod app {
         amplifiers: Amplifiers,
         encoders: Encoders,
         switches: Switches,
+        pulses: Pulses,
         operator: Operator,
         intake: &'static mut Intake<'static>,
         watchdog: Watchdog,
@@ -180,6 +181,7 @@ mod app {
             amplifiers: board.amplifiers,
             encoders: board.encoders,
             switches: board.switches,
+            pulses: board.pulses,
             operator: board.operator,
             intake,
             watchdog: board.watchdog,
@@ -215,7 +217,7 @@ mod app {
     /// The contract: begun when it is due, and done before the next one is. Both are checked in every tick, and nothing that could
     /// panic, divide by a helper or compute in f64 can be reached from here (`cargo xtask prove-no-panic`).
     #[task(binds = CONTROL_TICK, priority = 4, local = [
-        control, encoders, switches, operator, amplifiers, tick, requests_in, commands_out, snapshots_in,
+        control, encoders, switches, pulses, operator, amplifiers, tick, requests_in, commands_out, snapshots_in,
         free_snapshots_out, glitches_out, deadline_missed: bool = false,
     ])]
     fn control(cx: control::Context) {
@@ -242,7 +244,8 @@ mod app {
             deadline_missed: began_late || *cx.local.deadline_missed,
             ..Inputs::default()
         };
-        if cx.local.commands_out.ready() {
+        inputs.command = cx.local.pulses.step(control);
+        if inputs.command.is_none() && cx.local.commands_out.ready() {
             inputs.command = cx.local.commands_out.dequeue();
         }
         let outputs = control.tick(&mut inputs);

@@ -10,7 +10,9 @@ use quadrant_law::axis::telemetry::LimitedBy;
 use quadrant_law::command::Command;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant_law::motion::MotionMode;
-use quadrant_law::reference::{Motion, MotionScale, MotionSettings, MotionState, ReferenceSample};
+use quadrant_law::reference::{
+    FollowedPulses, Motion, MotionScale, MotionSettings, MotionState, ReferenceSample,
+};
 use quadrant_law::safety::SafetyState;
 use quadrant_law::stage::{Outputs, Plan};
 use quadrant_law::units::{POSITION_FRACTION_BITS, Position};
@@ -24,6 +26,8 @@ use crate::run::RunError;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GivenReference {
     samples: Arc<[ReferenceSample<f32>]>,
+    /// Distances from the feedback's reference, a sample of the preview ago; none, or as many as samples.
+    corrections: Arc<[Position]>,
 }
 
 impl GivenReference {
@@ -56,6 +60,7 @@ impl GivenReference {
                     acceleration: acceleration as f32,
                 })
                 .collect(),
+            corrections: Arc::default(),
         }
     }
 
@@ -69,6 +74,15 @@ impl GivenReference {
         }
         Self {
             samples: samples.into(),
+            corrections: Arc::default(),
+        }
+    }
+
+    /// The reference of counted pulses, from the position at which the first is counted.
+    pub fn of_pulses(followed: &[FollowedPulses<f32>]) -> Self {
+        Self {
+            samples: followed.iter().map(|tick| tick.ahead).collect(),
+            corrections: followed.iter().map(|tick| tick.correction).collect(),
         }
     }
 
@@ -336,7 +350,9 @@ impl GivenRun {
                 self.origins[index] = self.machine.state().axes()[index].reference();
             }
             sample.position = sample.position + self.origins[index];
-            self.machine.lead(AxisName::ALL[index], sample);
+            let correction = place.and_then(|place| reference.corrections.get(place));
+            self.machine
+                .lead(AxisName::ALL[index], sample, correction.copied());
         }
     }
 

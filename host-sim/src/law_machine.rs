@@ -12,6 +12,7 @@ use quadrant_law::safety::Switches;
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::{Inputs, Outputs, Plan, Stage, StageState};
 use quadrant_law::supervisor::{Event, PERIOD_TICKS, Supervisor};
+use quadrant_law::units::Position;
 use quadrant_settings::Job;
 use quadrant_settings::SettingsError;
 
@@ -127,11 +128,21 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
         self.plan[axis as usize] = motion;
     }
 
-    /// Leads an axis whose motion is given from elsewhere to its next sample.
+    /// Leads an axis whose motion is given from elsewhere to its next sample, and shifts the feedback's reference.
     #[inline]
-    pub(crate) fn lead(&mut self, axis: AxisName, sample: ReferenceSample<S>) {
+    pub(crate) fn lead(
+        &mut self,
+        axis: AxisName,
+        sample: ReferenceSample<S>,
+        correction: Option<Position>,
+    ) {
         if let Motion::Given(place) = &mut self.plan[axis as usize] {
             *place = sample;
+        }
+        if let Some(by) = correction {
+            self.stage
+                .as_ref()
+                .shift_reference(&mut self.state, axis, by);
         }
     }
 

@@ -3,6 +3,7 @@
 //! - [`plant`]: the stage, simulated, with friction that the control law does not know exactly;
 //! - [`law_machine`]: the control law and its supervisor, tick by tick; [`run`]: one run of it on the stage, and its traces;
 //! - [`given_run`]: a run on references in memory, some ticks at a time;
+//! - [`pulse_train`]: the pulses of a control with step and direction, and the axes that follow them;
 //! - [`metrics`]: tracking error and quadrant glitch; [`sine_test`]: an axis on a sine, scored; [`benchmark_job`]: the motion
 //!   that ticks are counted and timed with;
 //! - [`stage_setup`]: the stage of a simulated machine, and its settings; [`identified_stage`]: those that commissioning gave;
@@ -25,6 +26,7 @@ pub mod loop_shape;
 pub mod margins;
 pub mod metrics;
 pub mod plant;
+pub mod pulse_train;
 pub mod run;
 pub mod setting_value;
 pub mod settings_file;

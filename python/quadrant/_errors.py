@@ -9,7 +9,7 @@ class Fault(RuntimeError):
     Attributes
     ----------
     code : int
-        Stable number, 1 to 31.
+        Stable number, 1 to 33.
     name : str
         Stable name, such as ``"following-error"``.
     axis : str or None

@@ -6,6 +6,7 @@ use super::queues::{AxisSwap, CaptureCommand, ControlEnds, Order, StreamItem};
 use super::{Axis, Snapshot};
 use crate::app::capture::Capture;
 use crate::app::telemetry::{Observation, Sampler, SamplerState};
+use quadrant_law::admission::{self, Refusal};
 use quadrant_law::axes::{AxisName, PerAxis};
 use quadrant_law::command::Command;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
@@ -95,6 +96,11 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         &self.state
     }
 
+    /// The reason for which the law would refuse a command now.
+    pub(super) fn refusal(&self, command: Command) -> Option<Refusal> {
+        admission::refusal(self.stage().view(&self.plan, &self.state), command)
+    }
+
     /// Receives the number of valid requests of a host so far, from [`Intake::frames`](super::Intake::frames). Once a tick.
     #[inline(always)]
     pub fn note_requests(&mut self, frames: u32) {
@@ -111,6 +117,18 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             let stage = stage_of(&self.axes, &self.operation);
             stage.place_reference(&mut self.state, name, now);
         }
+    }
+
+    /// Shifts the feedback's reference of an axis that is led in the next tick.
+    pub(super) fn shift_reference(&mut self, name: AxisName, by: Position) {
+        let stage = stage_of(&self.axes, &self.operation);
+        stage.shift_reference(&mut self.state, name, by);
+    }
+
+    /// Reacts to a fault that a planner of the board's has found in an axis that it leads, before a tick.
+    pub(super) fn report_fault(&mut self, name: AxisName, code: FaultCode) {
+        let stage = stage_of(&self.axes, &self.operation);
+        stage.report_fault(&mut self.state, name, code);
     }
 
     /// Ends [`lead`](Self::lead): a plan of a host moves the axis again.

@@ -99,6 +99,7 @@ pub(crate) fn machine<S: Scalar>(
         board: board::NAME,
         cycle_hz,
         rates_hz: board::RATES_HZ,
+        pulse_axes: board::PULSE_AXES,
         number,
         log: board::TAKE_LOG,
     };

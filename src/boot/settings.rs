@@ -50,7 +50,7 @@ pub(super) fn load<S: Scalar>(
     let mut provenance = Provenance::new();
     let (mut invalid, mut keep_draft) = (false, false);
     let plan = match found {
-        Ok(Some(stored)) if stored.is_newest && !set_aside && is_possible(settings.rate_hz) => {
+        Ok(Some(stored)) if stored.is_newest && !set_aside && is_possible(settings) => {
             log::settings_loaded(settings, stored.sequence, &stored.provenance);
             provenance = stored.provenance;
             take(board::job(), None)
@@ -67,7 +67,7 @@ pub(super) fn load<S: Scalar>(
                     } else if set_aside {
                         "three starts with them did not last"
                     } else {
-                        "the board is not up to their rate_hz"
+                        "the board is not up to their rate_hz, or counts no steps for an axis with pulses"
                     };
                     defmt::error!(
                         "settings number {=u32} are in the draft, and not in force: {=str}",
@@ -109,9 +109,13 @@ pub(crate) fn forget_starts() {
     board::start_record::write(StartRecord::default());
 }
 
-/// True if the board is up to a control rate.
-fn is_possible(rate_hz: f64) -> bool {
-    (board::RATES_HZ.0..=board::RATES_HZ.1).contains(&rate_hz)
+/// True if the board is up to the control rate, and counts the steps that axes are to follow.
+fn is_possible(settings: &StageSettings) -> bool {
+    let follows = settings.axes.iter().map(|axis| axis.pulses.is_some());
+    (board::RATES_HZ.0..=board::RATES_HZ.1).contains(&settings.rate_hz)
+        && follows
+            .zip(board::PULSE_AXES)
+            .all(|(follows, counts)| counts || !follows)
 }
 
 /// Decodes the job that the board was given: its motions, and its settings into `settings`. Without a job, there is no

@@ -6,4 +6,5 @@ pub mod counter;
 pub mod dma_ring;
 pub mod hold_button;
 pub mod input_filter;
+pub mod step_counter;
 pub mod tick_interval;

@@ -2,7 +2,7 @@
 //!
 //! - [`thesis`]: chapters 3 to 5, and the headline figures, in one page;
 //! - studies, each of a few tables: [`identification`] judged by the plant's parameters, [`learning`], [`numerics`] (f32 and
-//!   fixed point against f64), [`outputs`] (the amplifier outputs' resolution), [`robustness`] (changed axes and cuts) and
+//!   fixed point against f64), [`outputs`] (the amplifier outputs' resolution), [`robustness`] (changed axes and cuts), [`step_direction`] (another control's pulses) and
 //!   [`wrong_model`] (feedforward whose model is wrong);
 //! - campaigns, a result from each of many seeds: [`random_axes`] (commissioning), [`random_faults`] (what must hold in every
 //!   case) and [`cuts`] (learning under random cuts);
@@ -20,6 +20,7 @@ pub mod outputs;
 pub mod random_axes;
 pub mod random_faults;
 pub mod robustness;
+pub mod step_direction;
 pub mod study;
 pub mod thesis;
 pub mod wrong_model;

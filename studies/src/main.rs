@@ -13,6 +13,7 @@ use quadrant_studies::outputs::Outputs;
 use quadrant_studies::random_axes::{Axes, cases};
 use quadrant_studies::random_faults::Faults;
 use quadrant_studies::robustness::Robustness;
+use quadrant_studies::step_direction::StepDirection;
 use quadrant_studies::thesis::Report;
 use quadrant_studies::wrong_model::WrongModel;
 use quadrant_studies::{campaign, study};
@@ -48,6 +49,8 @@ enum Command {
     Report(study::Arguments<Report>),
     /// Run the laws with a changed mass, friction, delay, amplifier or encoder, and while a tool cuts.
     Robustness(study::Arguments<Robustness>),
+    /// Let axes follow another control's pulses, and compare the reversals with those of the plan itself.
+    StepDirection(study::Arguments<StepDirection>),
     /// Run feedforward whose model is wrong behind the best PID.
     WrongModel(study::Arguments<WrongModel>),
 }
@@ -76,6 +79,7 @@ fn main() -> ExitCode {
         Command::Outputs(arguments) => arguments.run(),
         Command::Report(arguments) => arguments.run(),
         Command::Robustness(arguments) => arguments.run(),
+        Command::StepDirection(arguments) => arguments.run(),
         Command::WrongModel(arguments) => arguments.run(),
     };
     match done.and_then(|()| terminal::finish()) {

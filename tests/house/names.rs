@@ -137,7 +137,7 @@ fn settings_paths() -> Vec<Vec<String>> {
 
 /// A settings path in one of its written forms, from its first segment; none if the text is no such path.
 fn as_settings_path(span: &str) -> Option<Vec<String>> {
-    const PARTS: [&str; 10] = [
+    const PARTS: [&str; 11] = [
         "commissioned",
         "encoder",
         "amplifier",
@@ -147,6 +147,7 @@ fn as_settings_path(span: &str) -> Option<Vec<String>> {
         "friction",
         "feedforward",
         "homing",
+        "pulses",
         "streaming",
     ];
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "_*/.[]".contains(c);

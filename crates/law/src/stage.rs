@@ -335,6 +335,20 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         }
     }
 
+    /// Shifts the feedback's reference of the next tick from where the feedforward's was before the preview, if the axis follows its
+    /// plan and has a preview: to be called before every tick with [`Motion::Given`].
+    pub fn shift_reference(&self, state: &mut StageState<S, N>, name: AxisName, by: Position) {
+        let (axis, memory, tick) = (self.axes[name], &mut state.axes[name], state.tick);
+        if memory.mode() == MotionMode::Plan {
+            axis.shift_reference(memory, by, tick);
+        }
+    }
+
+    /// Reacts to a fault that a planner of the board's has found, before a tick.
+    pub fn report_fault(&self, state: &mut StageState<S, N>, name: AxisName, code: FaultCode) {
+        self.trip(state, code, Some(name), state.tick);
+    }
+
     /// True if an axis was commissioned, and no other has a law that could drive it.
     #[inline(always)]
     pub fn is_commissioned(&self) -> bool {

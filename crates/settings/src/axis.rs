@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::feedback::FeedbackSettings;
 use super::homing::HomingSettings;
 use super::limits::LimitSettings;
+use super::pulses::PulseSettings;
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::plant_model::PlantModel;
 use quadrant_law::feedforward::{FeedforwardGains, FeedforwardKind};
@@ -31,6 +32,9 @@ pub struct AxisSettings {
     /// Homing; none: the axis cannot be homed.
     #[serde(default)]
     pub homing: Option<HomingSettings>,
+    /// Step and direction of another control; none: the axis follows no pulses.
+    #[serde(default)]
+    pub pulses: Option<PulseSettings>,
     /// The linear model of the axis, if known: with it, the nonlinear gain is held to the Popov bound.
     pub plant: Option<PlantModel>,
     /// True if the axis was commissioned: by the tool, or by the person who entered its settings.
@@ -78,6 +82,9 @@ pub struct AmplifierSettings {
     /// Time for which the motor withstands the output limit, s.
     #[serde(default = "overload_s")]
     pub overload_s: f64,
+    /// True if the output is the feedforward alone, to be added to the force of another drive.
+    #[serde(default)]
+    pub feedforward_alone: bool,
 }
 
 fn continuous_v() -> f64 {

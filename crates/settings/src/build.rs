@@ -254,6 +254,8 @@ impl AxisSettings {
             .reduced_speed(limits.unhomed_mm_s.map(|reduced_mm_s| {
                 limits.overspeed_ratio * reduced_mm_s * period_s / encoder.resolution_mm
             }))
+            .pulses(self.build_pulses(scale, preview_ticks, longest_preview_ticks - preview_ticks))
+            .feedforward_alone(amplifier.feedforward_alone)
             .generator(self.build_generator(
                 stop_ramp,
                 (longest_preview_ticks - preview_ticks) as u32,

@@ -123,6 +123,7 @@ impl Default for AxisSettings {
             feedforward: FeedforwardSettings::default(),
             limits: LimitSettings::default(),
             homing: None,
+            pulses: None,
             plant: None,
             commissioned: false,
         }
@@ -150,6 +151,7 @@ impl Default for AmplifierSettings {
             continuous_v: default!("amplifier.continuous_v"),
             overload_s: default!("amplifier.overload_s"),
             reversed: false,
+            feedforward_alone: false,
         }
     }
 }

@@ -28,6 +28,7 @@ pub mod parts;
 pub mod path;
 pub mod popov;
 pub mod presets;
+mod pulses;
 pub mod response;
 mod stage;
 pub mod stream_planner;
@@ -45,5 +46,6 @@ pub use limits::{LimitSettings, TravelSettings};
 pub use operation::{
     BrakeSettings, EmergencyReaction, LossReaction, OperationSettings, StreamingSettings,
 };
+pub use pulses::PulseSettings;
 pub use stage::{Job, PlanSettings, StageSettings};
 pub use value::MAX_VALUE_BYTES;

@@ -6,6 +6,7 @@ use super::axis::AxisSettings;
 use super::homing::{HomeSwitch, HomingSettings};
 use super::leaves::default;
 use super::limits::TravelSettings;
+use super::pulses::PulseSettings;
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::cascade::CascadeGains;
 use quadrant_law::control::filter::FilterSettings;
@@ -43,7 +44,7 @@ macro_rules! part {
 }
 
 /// Every part that may be left out.
-pub static PARTS: [Part; 15] = [
+pub static PARTS: [Part; 16] = [
     part!(
         "/encoder/counts_per_index",
         encoder.counts_per_index,
@@ -164,6 +165,7 @@ pub static PARTS: [Part; 15] = [
             travel_mm: default!("homing.travel_mm"),
         }
     ),
+    part!("/pulses", pulses, PulseSettings::default()),
     part!(
         "/plant",
         plant,

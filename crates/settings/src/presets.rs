@@ -165,6 +165,7 @@ fn axis(parameters: &Parameters) -> AxisSettings {
             park_mm: 0.0,
             travel_mm: 410.0,
         }),
+        pulses: None,
         plant: Some(parameters.plant),
         commissioned: true,
     }

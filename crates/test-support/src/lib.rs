@@ -90,6 +90,8 @@ pub fn is_whole(path: &str) -> bool {
         "index_tolerance_counts",
         "teeth",
         "harmonics",
+        "gear_numerator",
+        "gear_denominator",
     ]
     .iter()
     .any(|name| path.ends_with(name))

@@ -9,3 +9,4 @@ mod plant;
 mod plant_disturbances;
 mod plant_drives;
 mod plant_unchanged;
+mod pulse_train;

@@ -85,6 +85,8 @@ pub struct ServerParts<'q, 'a, S: Scalar, F> {
     pub cycle_hz: u32,
     /// Control rates that the board is up to, Hz: the lowest and the highest.
     pub rates_hz: (f64, f64),
+    /// The axes whose steps of another control the board counts.
+    pub pulse_axes: [bool; 3],
     /// The number type of the control law.
     pub number: NumberType,
     /// The way to the board's log; none if the link cannot show it.
@@ -138,6 +140,7 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     board: &'static str,
     cycle_hz: u32,
     rates_hz: (f64, f64),
+    pulse_axes: [bool; 3],
     number: NumberType,
     take_log: Option<TakeLog>,
     log: LogRing,
@@ -195,6 +198,7 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
             board: parts.board,
             cycle_hz: parts.cycle_hz,
             rates_hz: parts.rates_hz,
+            pulse_axes: parts.pulse_axes,
             number: parts.number,
             take_log: parts.log,
             log: LogRing::new(),

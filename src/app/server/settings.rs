@@ -120,7 +120,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
                 "the settings applied last are still being built; ask again"
             )));
         }
-        self.check_rate()?;
+        self.check_board()?;
         let safety = self.draft.safety_change();
         let new_origins = self.draft.new_origins();
         if let Some(leaf) = safety
@@ -154,7 +154,21 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         }))
     }
 
-    /// Checks that the board is up to the draft's control rate.
+    /// Checks that the board is up to the draft's control rate and counts the pulses that axes are to follow.
+    fn check_board(&self) -> Result<(), LinkError> {
+        self.check_rate()?;
+        for name in AxisName::ALL {
+            let follows = self.draft.settings().axis(name).pulses.is_some();
+            if follows && !self.pulse_axes[index(name)] {
+                return Err(invalid(format_args!(
+                    "{name}/pulses: this board counts no steps for the axis; leave the part out, or use an axis that it counts \
+                     steps for (docs/step-direction.md)"
+                )));
+            }
+        }
+        Ok(())
+    }
+
     fn check_rate(&self) -> Result<(), LinkError> {
         let (lowest, highest) = self.rates_hz;
         let rate_hz = self.draft.settings().rate_hz;
@@ -212,7 +226,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     /// Stores the draft: the settings in force, unless it was edited since or needs a restart. Control keeps the outputs off.
     #[inline(never)]
     pub(super) fn save(&mut self, provenance: Provenance) -> Result<Reply, LinkError> {
-        self.check_rate()?;
+        self.check_board()?;
         self.store
             .save(
                 self.draft.settings(),

@@ -59,6 +59,8 @@ pub(crate) struct Board {
     pub(crate) amplifiers: Amplifiers,
     /// The control tick.
     pub(crate) tick: Tick,
+    /// Another control's step and direction: none.
+    pub(crate) pulses: Pulses,
     /// The work of the idle loop.
     pub(crate) idle: Idle,
     /// The link's port, in the shared memory.
@@ -76,6 +78,20 @@ pub(crate) const RATES_HZ: (f64, f64) = (1e3, 1e5);
 
 /// The log goes to the emulator, and is not on the link.
 pub(crate) const TAKE_LOG: Option<TakeLog> = None;
+
+/// The axes whose steps of another control are counted: none.
+pub(crate) const PULSE_AXES: [bool; 3] = [false; 3];
+
+/// No other control.
+pub(crate) struct Pulses;
+
+impl Pulses {
+    /// Returns no command.
+    #[inline(always)]
+    pub(crate) fn step<C>(&mut self, _control: &mut C) -> Option<Command> {
+        None
+    }
+}
 
 /// The board's name.
 pub(crate) const NAME: &str = "mps2";
@@ -102,6 +118,7 @@ impl Board {
         Self {
             encoders: Encoders { mode: boot.mode },
             switches: Switches,
+            pulses: Pulses,
             operator: Operator,
             amplifiers: Amplifiers {
                 mode: boot.mode,

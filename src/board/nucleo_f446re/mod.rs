@@ -17,11 +17,13 @@
 //! | home switches x, y, z           | PC10, PC11, PC12       | low while released |
 //! | enabling button                 | PC13 (B1, blue), hold to enable | |
 //! | link: to host, from host        | PA2, PA3               | USART2, DMA1 |
+//! | another control's step, direction (x) | PB6, PB7  | TIM4, 16 bit, extended |
+//! | its SERVO ON, our ALARM         | PA11, low is on; PA12, low is an alarm | |
 //! | on-chip converters (fallback)   | PA4, PA5               | DAC |
 //! | control tick                    |                        | TIM7 |
 //!
 //! Left alone: SWD and SWO (PA13, PA14, PB3), PA15 and PB4, which are JTAG's at power-up, the oscillators' (PC14, PC15,
-//! PH0, PH1), and the spare PA11, PA12, PB6, PB7, PD2.
+//! PH0, PH1), and the spare PD2.
 
 #[cfg(not(feature = "output-on-chip"))]
 mod amplifiers;
@@ -37,6 +39,7 @@ mod dma_memory;
 mod encoders;
 mod flash;
 mod pins;
+mod pulses;
 mod rtt;
 mod serial;
 mod switches;
@@ -53,11 +56,13 @@ use stm32f4xx_hal::rcc::{Config, Enable as _, Reset as _};
 pub(crate) use self::amplifiers::{Amplifiers, outputs_off};
 pub(crate) use self::encoders::Encoders;
 pub(crate) use self::flash::SettingsFlash;
+use self::pulses::StepInput;
 pub(crate) use self::serial::Serial;
 pub(crate) use self::switches::Switches;
 pub(crate) use self::tick::Tick;
 use self::watchdog::Supply;
 pub(crate) use self::watchdog::Watchdog;
+use quadrant::app::PulseLead;
 use quadrant::app::log_ring::TakeLog;
 use quadrant::drivers::hold_button::HoldButton;
 use quadrant::hal::ResetCause;
@@ -73,6 +78,8 @@ const CORE_HZ: u32 = 180_000_000;
 pub(crate) struct Board {
     /// Three position encoders.
     pub(crate) encoders: Encoders,
+    /// Another control's step and direction.
+    pub(crate) pulses: Pulses,
     /// The operator's requests.
     pub(crate) operator: Operator,
     /// Three amplifiers.
@@ -154,6 +161,8 @@ impl Board {
             z: (port_c.pc6, port_c.pc7, port_c.pc8),
         };
         let encoders = Encoders::new(chip.TIM2, chip.TIM3, chip.TIM8, encoder_pins, &mut rcc);
+        let pulse_pins = (port_b.pb6, port_b.pb7, port_a.pa11, port_a.pa12);
+        let pulses = PulseLead::new(StepInput::new(chip.TIM4, pulse_pins, &mut rcc));
         let serial = Serial::new(chip.USART2, chip.DMA1, (port_a.pa2, port_a.pa3), &mut rcc);
         match watchdog::brown_out_level(&chip.FLASH) {
             Some(level) => defmt::info!("brown-out reset: {=str}", level),
@@ -168,6 +177,7 @@ impl Board {
         let tick = Tick::new(chip.TIM7, core.DCB, core.DWT, &mut rcc);
         Self {
             encoders,
+            pulses,
             operator,
             amplifiers,
             tick,
@@ -187,6 +197,12 @@ pub(crate) const RATES_HZ: (f64, f64) = (2.5e3, 1.5e4);
 
 /// Takes bytes of the log out of its buffer.
 pub(crate) const TAKE_LOG: Option<TakeLog> = Some(rtt::take);
+
+/// The axes whose steps of another control are counted: one timer is left.
+pub(crate) const PULSE_AXES: [bool; 3] = [true, false, false];
+
+/// Another control that leads axes.
+pub(crate) type Pulses = PulseLead<StepInput>;
 
 /// The board's name.
 pub(crate) const NAME: &str = "nucleo-f446re";

@@ -269,6 +269,8 @@ pub(crate) fn of(code: FaultCode) -> Option<Case> {
         | FaultCode::Panic
         | FaultCode::HardFault
         | FaultCode::StopOverrun
+        | FaultCode::PulseOverspeed
+        | FaultCode::PulseJump
         | FaultCode::SettingsInvalid => return None,
     })
 }

@@ -143,6 +143,7 @@ pub fn start_halves<S: Scalar>(
             board: identity.board,
             cycle_hz: identity.cycle_hz,
             rates_hz: RATES_HZ,
+            pulse_axes: [false; 3],
             number: identity.number,
             log: None,
         }),

@@ -13,7 +13,7 @@ use crate::friction::FrictionSettings;
 use crate::friction::gms::FIRMWARE_ELEMENTS;
 use crate::learning::Learning;
 use crate::motion::ReferenceGenerator;
-use crate::reference::MotionScale;
+use crate::reference::{MotionScale, PulseReference};
 use crate::safety::monitor::{Following, IndexSpacing, Overspeed, SignalLoss, speed_limit};
 use crate::safety::oscillation::Oscillation;
 use crate::safety::overload::Overload;
@@ -114,6 +114,8 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.learning = Learning::off();
         axis.cancels = false;
         axis.cancelling.switch_off();
+        axis.feedforward_alone = false;
+        axis.pulses = None;
         let builder = Self {
             axis,
             resolution_mm,
@@ -296,6 +298,20 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
     #[must_use]
     pub fn generator(self, generator: ReferenceGenerator<S>) -> Self {
         self.axis.generator = generator;
+        self
+    }
+
+    /// The reference of another control's pulses, built for the same control period.
+    #[must_use]
+    pub fn pulses(self, pulses: Option<PulseReference<S>>) -> Self {
+        self.axis.pulses = pulses;
+        self
+    }
+
+    /// Puts out the feedforward alone, to be added to the force of another drive.
+    #[must_use]
+    pub fn feedforward_alone(self, alone: bool) -> Self {
+        self.axis.feedforward_alone = alone;
         self
     }
 

@@ -47,7 +47,7 @@ use crate::friction::gms::FIRMWARE_ELEMENTS;
 use crate::homing::HomingInput;
 use crate::learning::{Learning, LearningInput, LearningState, LearningStatus};
 use crate::motion::{GeneratorEvent, MotionMode, ReferenceGenerator};
-use crate::reference::{Motion, ReferenceSample};
+use crate::reference::{Motion, PulseReference, ReferenceSample};
 use crate::safety::monitor::{
     Following, IndexSpacing, Overspeed, OverspeedState, SignalLoss, SignalLossState,
 };
@@ -90,6 +90,8 @@ pub struct Axis<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     adapts: bool,
     learns: bool,
     cancels: bool,
+    /// The feedforward alone is put out.
+    feedforward_alone: bool,
     feedback: Feedback<S>,
     filters: Filters<S>,
     feedforward: Feedforward<S, N>,
@@ -104,6 +106,7 @@ pub struct Axis<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     commissioning: Commissioning,
     learning: Learning<S>,
     cancelling: Cancelling<S>,
+    pulses: Option<PulseReference<S>>,
 }
 
 /// The standing of an axis' settings: the outputs are enabled only if no axis is [`Missing`](Self::Missing) and one is
@@ -150,12 +153,19 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             learning: Learning::off(),
             cancels: false,
             cancelling: Cancelling::off(),
+            feedforward_alone: false,
+            pulses: None,
         }
     }
 
     /// The standing of the axis' settings.
     pub const fn commissioning(&self) -> Commissioning {
         self.commissioning
+    }
+
+    /// The reference of another control's pulses, if the axis follows any.
+    pub const fn pulses(&self) -> Option<&PulseReference<S>> {
+        self.pulses.as_ref()
     }
 
     /// Converter codes per volt; negative where the output is reversed.
@@ -507,6 +517,12 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         state.preview[delayed] = now;
     }
 
+    /// Shifts the feedback's reference of tick `tick` from where the feedforward's was before the preview.
+    pub(crate) fn shift_reference(&self, state: &mut AxisState<S, N>, by: Position, tick: u32) {
+        let delayed = (tick as usize).wrapping_sub(self.preview_ticks) % PREVIEW_ROOM;
+        state.preview[delayed] = state.preview[delayed] + by;
+    }
+
     /// Begins a controlled stop, unless one is under way.
     pub(crate) fn stop(&self, state: &mut AxisState<S, N>) {
         let from = state.reference_state();
@@ -746,7 +762,20 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         seen.bumpless_offset = seen
             .bumpless_offset
             .times(self.bumpless_decay, Quantity::Fraction);
-        self.put_out(state, output)
+        let code = self.put_out(state, output);
+        if self.feedforward_alone {
+            return self.feedforward_code(state);
+        }
+        code
+    }
+
+    /// The word of the feedforward alone, for an amplifier whose loop is another drive's. The law's own word stays what monitors and
+    /// learning compute with: that drive puts out about the same.
+    #[cold]
+    #[inline(never)]
+    fn feedforward_code(&self, state: &AxisState<S, N>) -> DacCode {
+        let total = state.telemetry.feedforward.total();
+        self.amplifier.code(total.within(self.amplifier.limit))
     }
 
     /// Takes note of a stop; at the next start the friction model adopts the integral's change since then.

@@ -11,6 +11,7 @@ mod jog;
 mod motion;
 mod motion_state;
 mod point_to_point;
+mod pulses;
 mod ramp;
 mod recorded;
 mod sample;
@@ -24,6 +25,10 @@ pub use jog::JogState;
 pub use motion::{Motion, MotionSettings};
 pub use motion_state::MotionState;
 pub use point_to_point::{PointToPoint, PointToPointSettings};
+pub use pulses::{
+    FollowedPulses, MAX_PULSE_DELAY_TICKS, MAX_PULSE_WAIT_TICKS, PulseReference, PulseScale,
+    PulseState,
+};
 pub use ramp::{Ramp, RampState, Velocity, steps_per_mm};
 pub use recorded::RecordedTable;
 pub use sample::{MotionScale, ReferenceSample};

@@ -91,6 +91,10 @@ pub enum FaultCode {
     Overload = 30,
     /// The axis swung to and fro by itself.
     Oscillation = 31,
+    /// The pulses of the control are faster than the axis may go.
+    PulseOverspeed = 32,
+    /// The pulses of the control changed in speed or sense as no axis does.
+    PulseJump = 33,
 }
 
 impl FaultCode {
@@ -101,7 +105,7 @@ impl FaultCode {
             .first_chunk()
             .unwrap();
 
-    /// The stable number, 1 to 31.
+    /// The stable number, 1 to 33.
     pub const fn number(self) -> u8 {
         self as u8
     }
@@ -146,7 +150,9 @@ impl FaultCode {
             | Self::InjectionUnderrun
             | Self::InjectionBounds
             | Self::Overload
-            | Self::Oscillation => Reaction::Stop,
+            | Self::Oscillation
+            | Self::PulseOverspeed
+            | Self::PulseJump => Reaction::Stop,
             _ => Reaction::Off,
         }
     }
@@ -278,6 +284,15 @@ impl FaultCode {
                 "the axis swung evenly for a second by more than following_error_mm",
                 "lower the gains of the feedback, or identify the plant and design them again; check for a loose coupling and a \
                  spring between motor and encoder",
+            ],
+            Self::PulseOverspeed => [
+                "the control's pulses were faster than limits.max_velocity_mm_s",
+                "lower the control's largest feed; check pulses.step_mm and the gear against the control's steps per mm",
+            ],
+            Self::PulseJump => [
+                "the control's pulses changed in speed or sense faster than the axis can: pulses were added or lost",
+                "check cable, shield and ground of step and direction, the pulse's length and the set-up time of direction; lower the \
+                 control's acceleration; then find the position again",
             ],
             Self::StopOverrun => [
                 "a controlled stop lasted longer than braking_mm_s2 and braking_jerk_mm_s3 allow",

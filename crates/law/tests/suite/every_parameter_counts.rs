@@ -60,8 +60,9 @@ fn run<S: Scalar>(settings: &StageSettings, jumping: usize) -> Option<Trace> {
 fn leaves(value: &Value, path: &str, found: &mut Vec<String>) {
     match value {
         Value::Object(fields) => {
-            // On an axis of which the runs here know the plant, they act: `learning.rs`, `cancelling.rs`.
-            let known = ["learning", "cancelling"];
+            // On an axis of which the runs here know the plant, they act: `learning.rs`, `cancelling.rs`. Pulses act
+            // where a board counts them.
+            let known = ["learning", "cancelling", "pulses"];
             for (name, value) in fields
                 .iter()
                 .filter(|(name, _)| !known.contains(&name.as_str()))

@@ -42,6 +42,7 @@ mod parameter_trace;
 mod pid;
 mod plausibility;
 mod provocations;
+mod pulses;
 mod reference_harmonic;
 mod reference_move;
 mod reference_ramp;

@@ -35,7 +35,7 @@ enum Clears {
 use Clears::{Reset, StoreAndReset};
 
 /// Number, name, reaction, what clears it, and the ticks within which `safety_faults` provokes it; none: other tests do.
-const EXPECTED: [(u8, &str, Does, Clears, Option<u32>); 31] = [
+const EXPECTED: [(u8, &str, Does, Clears, Option<u32>); 33] = [
     (1, "following-error", Off, Reset, Some(19)),
     (2, "encoder-jump", Off, Reset, Some(1)),
     (3, "deadline-missed", Off, Reset, Some(1)),
@@ -67,6 +67,8 @@ const EXPECTED: [(u8, &str, Does, Clears, Option<u32>); 31] = [
     (29, "stop-overrun", Off, Reset, None),
     (30, "overload", Stop, Reset, None),
     (31, "oscillation", Stop, Reset, None),
+    (32, "pulse-overspeed", Stop, Reset, None),
+    (33, "pulse-jump", Stop, Reset, None),
 ];
 
 fn row(code: FaultCode) -> (Does, Clears, Option<u32>) {

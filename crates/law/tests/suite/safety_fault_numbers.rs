@@ -39,11 +39,13 @@ fn numbers_and_names_are_stable() {
             "stop-overrun",
             "overload",
             "oscillation",
+            "pulse-overspeed",
+            "pulse-jump",
         ]
     );
     for code in FaultCode::ALL {
         assert_eq!(FaultCode::from_number(code.number()), Some(code));
     }
     assert_eq!(FaultCode::from_number(0), None);
-    assert_eq!(FaultCode::from_number(32), None);
+    assert_eq!(FaultCode::from_number(34), None);
 }

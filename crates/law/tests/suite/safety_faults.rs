@@ -357,7 +357,7 @@ fn every_fault_is_found_in_its_tick_with_the_outputs_of_its_reaction() {
 }
 
 /// Those of other tests, and then those that the tick cannot find by itself.
-pub(crate) const OF_OTHERS: [FaultCode; 11] = [
+pub(crate) const OF_OTHERS: [FaultCode; 13] = [
     // Of a stream: see the tests of streaming.
     FaultCode::StreamUnderrun,
     // Of an injected voltage: see its tests.
@@ -371,6 +371,9 @@ pub(crate) const OF_OTHERS: [FaultCode; 11] = [
     FaultCode::Overload,
     // Of a loop that swings: see `oscillation`.
     FaultCode::Oscillation,
+    // Of another control's pulses: see `pulses`.
+    FaultCode::PulseOverspeed,
+    FaultCode::PulseJump,
     FaultCode::WatchdogReset,
     FaultCode::Panic,
     FaultCode::HardFault,

@@ -11,6 +11,7 @@
 mod feedback;
 mod friction;
 pub(super) mod limits;
+mod pulses;
 mod row;
 pub(super) mod rules;
 mod stage;

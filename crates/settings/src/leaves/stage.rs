@@ -97,6 +97,8 @@ pub(super) const AMPLIFIER_AND_PLANT: &[LeafInfo] = &exchanged(Exchange::Disable
         "Output that the motor withstands indefinitely; from the output limit on, the load is not watched."),
     number("amplifier.overload_s", "s", at(0.01), at(1e3), 2.0,
         "Time for which the motor withstands the output limit, after rest (I²t)."),
+    flag("amplifier.feedforward_alone",
+        "True if the output is the feedforward alone, to be added to the force of another drive that closes the loop."),
     flag("commissioned",
         "True if the axis was commissioned, by the tool or by a person; outputs are enabled only if one was, and every other \
          has no gains, feedforward or offset."),

@@ -1,21 +1,22 @@
 //! The rows of all groups as one table.
 
 use super::row::{LeafInfo, Range};
-use super::{feedback, friction, limits, stage};
+use super::{feedback, friction, limits, pulses, stage};
 
 /// The rows of an axis, by group.
-pub(super) const OF_AXIS: [&[LeafInfo]; 5] = [
+pub(super) const OF_AXIS: [&[LeafInfo]; 6] = [
     stage::ENCODER,
     stage::AMPLIFIER_AND_PLANT,
     limits::LEAVES,
+    pulses::LEAVES,
     feedback::LEAVES,
     friction::LEAVES,
 ];
 
-/// Every leaf: stage, encoder, amplifier and plant; limits and homing; feedback; friction and feedforward.
+/// Every leaf: stage, encoder, amplifier and plant; limits and homing; pulses; feedback; friction and feedforward.
 pub fn all() -> impl Iterator<Item = &'static LeafInfo> {
     const STAGE: &[LeafInfo] = stage::OF_STAGE;
-    const AXIS: [&[LeafInfo]; 5] = OF_AXIS;
+    const AXIS: [&[LeafInfo]; 6] = OF_AXIS;
     STAGE.iter().chain(AXIS.into_iter().flatten())
 }
 

@@ -215,8 +215,8 @@ fn every_leaf_of_amplifier_limits_homing_plant_and_commissioning_needs_the_outpu
         let group = leaf.field.split('.').next().expect("a name");
         let expected = match group {
             "rate_hz" | "encoder" => Exchange::Restart,
-            "operation" | "brake" | "streaming" | "amplifier" | "limits" | "homing" | "plant"
-            | "commissioned" => Exchange::Disabled,
+            "operation" | "brake" | "streaming" | "amplifier" | "limits" | "homing" | "pulses"
+            | "plant" | "commissioned" => Exchange::Disabled,
             // The comparison of encoder and plant allows for it.
             "feedforward" if leaf.field == "feedforward.cancelling.limit_v" => Exchange::Disabled,
             "feedback" | "friction" | "feedforward" => Exchange::Driven,

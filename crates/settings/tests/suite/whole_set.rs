@@ -3,7 +3,9 @@
 use quadrant_law::axes::AxisName;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::decimal::Decimal;
-use quadrant_settings::{FeedbackSettings, PlanSettings, Reason, SettingsError, StageSettings};
+use quadrant_settings::{
+    FeedbackSettings, PlanSettings, PulseSettings, Reason, SettingsError, StageSettings,
+};
 
 use crate::fields::{FIELDS, number};
 use crate::leaves::law_of;
@@ -139,6 +141,42 @@ fn the_spacing_of_the_index_and_its_tolerance_have_ranges() {
     let error = refusal(&with_x(|axis| axis.encoder.counts_per_index = None));
     check_message(&error, AxisName::X, "homing.index");
     assert!(error.to_string().contains("encoder/counts_per_index"));
+}
+
+#[test]
+fn the_pulses_of_another_control_have_ranges_and_a_step_of_at_most_1024_counts() {
+    let with = |change: fn(&mut PulseSettings)| {
+        let mut pulses = PulseSettings {
+            step_mm: 5e-3,
+            ..PulseSettings::default()
+        };
+        change(&mut pulses);
+        with_x(|axis| axis.pulses = Some(pulses))
+    };
+    assert_eq!(with(|_| {}).validate(ROOM), Ok(()));
+    assert_eq!(
+        with(|pulses| pulses.gear_numerator = 102).validate(ROOM),
+        Ok(())
+    );
+    type Change = fn(&mut PulseSettings);
+    let refused: [(Change, &str); 8] = [
+        (|pulses| pulses.step_mm = 0.0, "pulses.step_mm"),
+        (|pulses| pulses.step_mm = f64::NAN, "pulses.step_mm"),
+        (|pulses| pulses.step_mm = 0.513, "pulses.step_mm"),
+        (|pulses| pulses.gear_numerator = 103, "pulses.step_mm"),
+        (|pulses| pulses.gear_numerator = 0, "pulses.gear_numerator"),
+        (
+            |pulses| pulses.gear_denominator = 0,
+            "pulses.gear_denominator",
+        ),
+        (|pulses| pulses.delay_s = -1e-6, "pulses.delay_s"),
+        (|pulses| pulses.delay_s = 24e-3, "pulses.delay_s"),
+    ];
+    for (change, field) in refused {
+        check_message(&refusal(&with(change)), AxisName::X, field);
+    }
+    let missing = with_x(|axis| axis.pulses = Some(PulseSettings::default()));
+    check_message(&refusal(&missing), AxisName::X, "pulses.step_mm");
 }
 
 #[test]

@@ -1,0 +1,193 @@
+//! Axes that another control leads by step and direction.
+//!
+//! The control switches them on and off by its line SERVO ON, as it does with a drive. An axis whose settings have `pulses` follows the
+//! steps from where it stands when it is enabled: what the control counted before does not matter. A host may move it while the line is
+//! off, or before it begins to follow.
+
+use quadrant_law::axes::{AxisName, PerAxis};
+use quadrant_law::axis::Commissioning;
+use quadrant_law::command::Command;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::reference::{PulseState, ReferenceSample};
+use quadrant_law::safety::{FaultCode, SafetyState};
+use quadrant_law::scalar::Scalar;
+
+use super::Control;
+use crate::drivers::hold_button::HoldButton;
+use crate::hal::{PulseReadings, Pulses};
+
+/// Ticks in which the outputs must have been enabled.
+const ENABLING_TICKS: u32 = 50;
+
+/// The control's hold on an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Hold {
+    /// None: the axis stands, or a host moves it.
+    #[default]
+    Released,
+    /// The axis follows the steps.
+    Leads,
+    /// It followed them until a fault or a host stopped it, and does not again before the line was off.
+    Ended,
+}
+
+/// The lines of a control, and the axes that it leads.
+#[derive(Debug)]
+pub struct PulseLead<P> {
+    lines: P,
+    servo_on: HoldButton,
+    /// The line is on, and counts.
+    is_on: bool,
+    /// Ticks in which the outputs are yet to be enabled.
+    enabling: u32,
+    holds: PerAxis<Hold>,
+    states: [PulseState; 3],
+}
+
+impl<P: Pulses> PulseLead<P> {
+    /// A control that leads nothing yet.
+    pub fn new(lines: P) -> Self {
+        Self {
+            lines,
+            servo_on: HoldButton::new(),
+            is_on: false,
+            enabling: 0,
+            holds: PerAxis::splat(Hold::Released),
+            states: Default::default(),
+        }
+    }
+
+    /// Reads the lines and moves the references of the axes that follow, before a tick; returns the command that the lines bring about
+    /// in it.
+    #[inline(never)]
+    pub fn step<S: Scalar>(&mut self, control: &mut Control<'_, '_, S>) -> Option<Command> {
+        let stage = control.stage();
+        let follows =
+            PerAxis::from_fn(|name| P::AXES[name as usize] && stage.axes[name].pulses().is_some());
+        if !follows.contains(&true) {
+            return None;
+        }
+        let seen = self.lines.read();
+        for name in AxisName::ALL {
+            if follows[name] {
+                self.follow(control, name, &seen);
+            } else {
+                self.holds[name] = Hold::Released;
+            }
+        }
+        let request = self.servo_on.step(seen.servo_on);
+        let safety = control.state().safety();
+        self.lines.set_alarm(self.is_alarmed(safety));
+        match request {
+            // Two cannot lead: what a host drives ends, and the control does not take over what it has not seen begin.
+            Some(Command::Enable) if safety.drives() => {
+                self.is_on = true;
+                self.enabling = 0;
+                self.holds = PerAxis::splat(Hold::Ended);
+                return Some(Command::Disable);
+            }
+            Some(Command::Enable) => {
+                self.is_on = true;
+                self.enabling = ENABLING_TICKS;
+                self.holds = PerAxis::splat(Hold::Released);
+            }
+            Some(_) => {
+                self.is_on = false;
+                self.enabling = 0;
+                return safety.drives().then_some(Command::Disable);
+            }
+            None => {}
+        }
+        if !self.is_on {
+            return None;
+        }
+        if self.enabling > 0 {
+            self.enabling -= 1;
+            match safety {
+                SafetyState::Faulted(_) => return Some(Command::ResetFault),
+                SafetyState::Disabled => return Some(Command::Enable),
+                SafetyState::Enabled => self.enabling = 0,
+                SafetyState::Start | SafetyState::Stopping(_) => {}
+            }
+        }
+        if safety.is_enabled() {
+            return self.take_hold(control, follows, &seen);
+        }
+        None
+    }
+
+    /// True if the control must not go on: a fault, outputs that could not be enabled, or an axis that no longer follows.
+    fn is_alarmed(&self, safety: SafetyState) -> bool {
+        let waits = self.is_on && self.enabling == 0 && !safety.drives();
+        safety.fault().is_some() || waits || self.holds.contains(&Hold::Ended)
+    }
+
+    /// Moves the reference of an axis that follows the steps.
+    fn follow<S: Scalar>(
+        &mut self,
+        control: &mut Control<'_, '_, S>,
+        name: AxisName,
+        seen: &PulseReadings,
+    ) {
+        if self.holds[name] != Hold::Leads {
+            return;
+        }
+        let index = name as usize;
+        let state = control.state();
+        let follows = state.axes()[name].mode() == MotionMode::Plan;
+        if !(follows && state.safety().is_enabled()) {
+            self.holds[name] = Hold::Ended;
+            return control.release(name);
+        }
+        let Some(pulses) = control.stage().axes[name].pulses().copied() else {
+            return;
+        };
+        let found = if seen.lost[index] {
+            Err(FaultCode::PulseJump)
+        } else {
+            pulses.step(&mut self.states[index], seen.counts[index])
+        };
+        match found {
+            Ok(followed) => {
+                control.lead(name, None, followed.ahead);
+                control.shift_reference(name, followed.correction);
+            }
+            Err(code) => {
+                self.holds[name] = Hold::Ended;
+                control.report_fault(name, code);
+            }
+        }
+    }
+
+    /// Lets the next axis that stands follow the steps.
+    fn take_hold<S: Scalar>(
+        &mut self,
+        control: &mut Control<'_, '_, S>,
+        follows: PerAxis<bool>,
+        seen: &PulseReadings,
+    ) -> Option<Command> {
+        for name in AxisName::ALL {
+            let axis = control.stage().axes[name];
+            let state = &control.state().axes()[name];
+            let command = Command::StartMove(name);
+            if self.holds[name] != Hold::Released
+                || !follows[name]
+                || axis.commissioning() != Commissioning::Done
+                || state.mode() != MotionMode::Hold
+                || control.refusal(command).is_some()
+            {
+                continue;
+            }
+            let position = state.reference();
+            self.holds[name] = Hold::Leads;
+            self.states[name as usize].start(seen.counts[name as usize], position);
+            let standing = ReferenceSample {
+                position,
+                ..ReferenceSample::default()
+            };
+            control.lead(name, None, standing);
+            return Some(command);
+        }
+        None
+    }
+}
