@@ -131,7 +131,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         None => recommended(&candidates),
     };
     let best = best.context("no model of the record is one of friction")?;
-    let refined = refined(best, &recording, &settings);
+    // What the record hardly determines, its motion in open loop does not determine either, and the search takes a minute.
+    let doubtful = !best.model.doubts().is_empty();
+    let refined = (!doubtful).then(|| refined(best, &recording, &settings));
     bar.set_message("running the models");
     let signals = Signals::new(&recording, &settings);
     let rerun = |candidate: &Candidate| Reruns {
@@ -146,7 +148,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .position(is_best)
         .context("the recommended model is none of the candidates")?;
     // A search that found no end, or nothing better, leaves the best as it is.
-    if let Ok(refined) = refined {
+    if let Some(Ok(refined)) = refined {
         let rms = |candidate: &Candidate| rerun(candidate).open_loop.position_rms_mm;
         if refined.explains_as_well_as(best) && rms(&refined) < rms(best) {
             chosen = candidates.len();
@@ -204,6 +206,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             put_friction(settings, model.friction_settings());
         },
     )?;
+    for doubt in model.doubts() {
+        warn!(
+            "warning: {} is known to ± {:.0} % only, and the plant is made of it: record {}",
+            doubt.name,
+            100.0 * doubt.share,
+            doubt.remedy
+        );
+    }
     if error > DOUBTFUL_ERROR {
         warn!(
             "warning: the model explains {explained:.0} % of the voltage only; what is missing in it is in no parameter"

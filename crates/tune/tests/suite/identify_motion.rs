@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_tune::identify::motion::{
     Candidate, CascadeLoop, MotionFitError, MotionFitSettings, MotionModel, Signals, fit_motion,
@@ -11,7 +12,7 @@ use quadrant_tune::identify::motion::{
 };
 use quadrant_tune::identify::setting::SettingError;
 use quadrant_tune::record::{MotionOptions, Recording};
-use quadrant_tune::test_axis::SimulatedTestAxis;
+use quadrant_tune::test_axis::{Drive, Experiment, SimulatedTestAxis, TestAxis};
 
 /// Force constant of the EMPS drive, N/V (see the record's own description).
 const FORCE_N_PER_V: f64 = 35.150_651_882_485_47;
@@ -511,6 +512,35 @@ fn no_candidate_has_a_mass_or_a_friction_below_zero() {
             }
         }
     }
+}
+
+/// The record of a slow sine, whose force of inertia is a thousandth of its friction.
+#[test]
+fn a_record_that_hardly_accelerates_leaves_its_inertia_in_doubt_and_an_ordinary_one_does_not() {
+    let truth = &StageParameters::real().axes[0];
+    let mut test_axis = SimulatedTestAxis::new(0, truth.clone(), 1);
+    let sine = HarmonicSettings::with_velocity(15.0, 15.0, 2.0, 0.5);
+    let slow = Experiment {
+        name: "a slow sine".to_owned(),
+        drive: Drive::ClosedLoop(MotionSettings::Harmonic(sine)),
+        injection_v: Vec::new(),
+        decimation: 2,
+        time_limit_s: 60.0,
+    };
+    let record = test_axis.perform(&slow, &mut |_| {}).unwrap();
+    let doubts = |record: &Recording| {
+        let candidates = fitted(record, &MotionFitSettings::default());
+        recommended(&candidates).unwrap().model.doubts()
+    };
+    let found = doubts(&record);
+    assert!(
+        found.iter().any(|doubt| doubt.name == "M'"
+            && doubt.share > 0.25
+            && doubt.remedy.contains("accelerate")),
+        "{found:?}"
+    );
+    let found = doubts(&simulated(0, truth));
+    assert!(found.is_empty(), "{found:?}");
 }
 
 #[test]

@@ -31,7 +31,7 @@ mod zero_phase;
 
 pub use error::MotionFitError;
 pub use fit::{Candidate, Rows, fit_motion, recommended, recommended_by, refined, validate};
-pub use model::{Change, Estimate, MotionModel, Span, Structure};
+pub use model::{Change, Doubt, Estimate, MotionModel, Span, Structure};
 pub use shuttle::shuttle;
 pub use signals::{MotionFitSettings, Signals};
 pub use simulate::{CascadeLoop, Replayed, replay_closed_loop, replay_open_loop};

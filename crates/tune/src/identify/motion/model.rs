@@ -122,6 +122,20 @@ pub struct Estimate {
     pub to_si: (f64, &'static str),
 }
 
+/// A parameter that a record hardly determines.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Doubt {
+    /// Name of the parameter.
+    pub name: String,
+    /// Its standard error over its value.
+    pub share: f64,
+    /// Motion that would determine it.
+    pub remedy: &'static str,
+}
+
+/// Standard error of a parameter, over its value, above which it is in doubt.
+const DOUBTFUL_SHARE: f64 = 0.25;
+
 /// A model of an axis' inertia and friction, as seen at the amplifier's input.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionModel {
@@ -217,6 +231,26 @@ impl MotionModel {
             elements,
             attraction_v_s: breakaway_v / LAG_S,
         }
+    }
+
+    /// The inertia and the damping, if the record hardly determines them: the plant is made of both.
+    pub fn doubts(&self) -> Vec<Doubt> {
+        let doubt = |estimate: &Estimate| {
+            let share = estimate.standard_error / estimate.value.abs();
+            let remedy = match estimate.name.as_str() {
+                "M'" => "moves that accelerate more, back and forth",
+                name if name.starts_with("sigma") => {
+                    "moves at several speeds both ways, the fastest included"
+                }
+                _ => return None,
+            };
+            (share > DOUBTFUL_SHARE).then(|| Doubt {
+                name: estimate.name.clone(),
+                share,
+                remedy,
+            })
+        };
+        self.estimates.iter().filter_map(doubt).collect()
     }
 
     /// Its friction as settings hold it: that of the middle of the record and of the travel.
