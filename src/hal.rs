@@ -55,9 +55,6 @@ pub struct PulseReadings {
 
 /// The lines of another control that leads axes by step and direction.
 pub trait Pulses {
-    /// The axes whose steps the board counts: x, y, z.
-    const AXES: [bool; 3];
-
     /// Reads all of them; to be called once a tick. A broken wire of SERVO ON reads as off.
     fn read(&mut self) -> PulseReadings;
 

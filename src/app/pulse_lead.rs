@@ -33,27 +33,28 @@ enum Hold {
 
 /// The lines of a control, and the axes that it leads.
 #[derive(Debug)]
-pub struct PulseLead<P> {
+pub struct PulseLead<'a, P> {
     lines: P,
+    /// The memories of the axes whose steps are counted.
+    states: [Option<&'a mut PulseState>; 3],
     servo_on: HoldButton,
     /// The line is on, and counts.
     is_on: bool,
     /// Ticks in which the outputs are yet to be enabled.
     enabling: u32,
     holds: PerAxis<Hold>,
-    states: [PulseState; 3],
 }
 
-impl<P: Pulses> PulseLead<P> {
-    /// A control that leads nothing yet.
-    pub fn new(lines: P) -> Self {
+impl<'a, P: Pulses> PulseLead<'a, P> {
+    /// A control that leads nothing yet. `states` has a memory for each axis whose steps the board counts.
+    pub fn new(lines: P, states: [Option<&'a mut PulseState>; 3]) -> Self {
         Self {
             lines,
+            states,
             servo_on: HoldButton::new(),
             is_on: false,
             enabling: 0,
             holds: PerAxis::splat(Hold::Released),
-            states: Default::default(),
         }
     }
 
@@ -62,8 +63,9 @@ impl<P: Pulses> PulseLead<P> {
     #[inline(never)]
     pub fn step<S: Scalar>(&mut self, control: &mut Control<'_, '_, S>) -> Option<Command> {
         let stage = control.stage();
-        let follows =
-            PerAxis::from_fn(|name| P::AXES[name as usize] && stage.axes[name].pulses().is_some());
+        let follows = PerAxis::from_fn(|name| {
+            self.states[name as usize].is_some() && stage.axes[name].pulses().is_some()
+        });
         if !follows.contains(&true) {
             return None;
         }
@@ -139,13 +141,14 @@ impl<P: Pulses> PulseLead<P> {
             self.holds[name] = Hold::Ended;
             return control.release(name);
         }
-        let Some(pulses) = control.stage().axes[name].pulses().copied() else {
+        let pulses = control.stage().axes[name].pulses().copied();
+        let (Some(pulses), Some(memory)) = (pulses, &mut self.states[index]) else {
             return;
         };
         let found = if seen.lost[index] {
             Err(FaultCode::PulseJump)
         } else {
-            pulses.step(&mut self.states[index], seen.counts[index])
+            pulses.step(memory, seen.counts[index])
         };
         match found {
             Ok(followed) => {
@@ -180,7 +183,9 @@ impl<P: Pulses> PulseLead<P> {
             }
             let position = state.reference();
             self.holds[name] = Hold::Leads;
-            self.states[name as usize].start(seen.counts[name as usize], position);
+            if let Some(memory) = &mut self.states[name as usize] {
+                memory.start(seen.counts[name as usize], position);
+            }
             let standing = ReferenceSample {
                 position,
                 ..ReferenceSample::default()

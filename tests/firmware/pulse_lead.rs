@@ -9,7 +9,7 @@ use quadrant_fault_bench::tasks::Tasks;
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::motion::MotionMode;
-use quadrant_law::reference::Velocity;
+use quadrant_law::reference::{PulseState, Velocity};
 use quadrant_law::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
 use quadrant_law::stage::Outputs;
 use quadrant_law::units::Position;
@@ -34,8 +34,6 @@ struct Lines {
 struct BoardEnd(Rc<RefCell<Lines>>);
 
 impl Pulses for BoardEnd {
-    const AXES: [bool; 3] = [true, true, false];
-
     fn read(&mut self) -> PulseReadings {
         self.0.borrow().seen
     }
@@ -48,7 +46,7 @@ impl Pulses for BoardEnd {
 /// The fast half behind those lines, on the simulated stage.
 struct Rig {
     control: Control<'static, 'static, f32>,
-    lead: PulseLead<BoardEnd>,
+    lead: PulseLead<'static, BoardEnd>,
     lines: Rc<RefCell<Lines>>,
     stage: SimulatedStage,
     outputs: Outputs,
@@ -74,9 +72,10 @@ impl Rig {
         let queues: &'static mut Queues<'static, f32> = Box::leak(Box::new(Queues::new()));
         let (ends, ..) = queues.split();
         let lines: Rc<RefCell<Lines>> = Rc::default();
+        let memory = || Some(Box::leak(Box::<PulseState>::default()));
         Self {
             control: Control::new(axes, operation, plan, settings.rate_hz as u32, ends),
-            lead: PulseLead::new(BoardEnd(Rc::clone(&lines))),
+            lead: PulseLead::new(BoardEnd(Rc::clone(&lines)), [memory(), memory(), None]),
             lines,
             stage: SimulatedStage::new(&StageParameters::ideal(), settings.rate_hz, 1),
             outputs: Outputs::default(),

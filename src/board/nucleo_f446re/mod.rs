@@ -67,6 +67,7 @@ use quadrant::app::log_ring::TakeLog;
 use quadrant::drivers::hold_button::HoldButton;
 use quadrant::hal::ResetCause;
 use quadrant_law::command::Command;
+use quadrant_law::reference::PulseState;
 
 use super::{Finished, Outcome};
 
@@ -162,7 +163,11 @@ impl Board {
         };
         let encoders = Encoders::new(chip.TIM2, chip.TIM3, chip.TIM8, encoder_pins, &mut rcc);
         let pulse_pins = (port_b.pb6, port_b.pb7, port_a.pa11, port_a.pa12);
-        let pulses = PulseLead::new(StepInput::new(chip.TIM4, pulse_pins, &mut rcc));
+        let memory = cortex_m::singleton!(: PulseState = PulseState::new());
+        let pulses = PulseLead::new(
+            StepInput::new(chip.TIM4, pulse_pins, &mut rcc),
+            [memory, None, None],
+        );
         let serial = Serial::new(chip.USART2, chip.DMA1, (port_a.pa2, port_a.pa3), &mut rcc);
         match watchdog::brown_out_level(&chip.FLASH) {
             Some(level) => defmt::info!("brown-out reset: {=str}", level),
@@ -202,7 +207,7 @@ pub(crate) const TAKE_LOG: Option<TakeLog> = Some(rtt::take);
 pub(crate) const PULSE_AXES: [bool; 3] = [true, false, false];
 
 /// Another control that leads axes.
-pub(crate) type Pulses = PulseLead<StepInput>;
+pub(crate) type Pulses = PulseLead<'static, StepInput>;
 
 /// The board's name.
 pub(crate) const NAME: &str = "nucleo-f446re";

@@ -80,8 +80,6 @@ fn is_backwards() -> bool {
 }
 
 impl hal::Pulses for StepInput {
-    const AXES: [bool; 3] = super::PULSE_AXES;
-
     /// The level is read first, then the count, then the capture: [`StepCounter::read`] allows for an edge in between.
     #[inline(always)]
     fn read(&mut self) -> PulseReadings {

@@ -120,6 +120,13 @@ pub struct PulseState {
 
 impl Default for PulseState {
     fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl PulseState {
+    /// A memory of no pulses, at the origin.
+    pub const fn new() -> Self {
         Self {
             count: 0,
             position: Position::ZERO,
@@ -132,9 +139,7 @@ impl Default for PulseState {
             place: 0,
         }
     }
-}
 
-impl PulseState {
     /// Begins at rest: `count` is the counter's, `position` that of the reference.
     pub fn start(&mut self, count: u32, position: Position) {
         // Field by field: a whole memory, made apart and copied, takes half a tick longer.
