@@ -27,12 +27,14 @@ pub(super) fn built_in_for(axis: AxisName) -> SettingsFile {
     file
 }
 
-/// The same without any law: what is identified of an axis is no law.
-pub(super) fn without_laws() -> SettingsFile {
-    let mut file = built_in();
-    for axis in &mut file.stage.axes {
-        without_law(axis, file.stage.rate_hz);
-    }
+/// The same without the law of `axis`: what is identified of it is no law.
+pub(super) fn without_laws(axis: AxisName) -> SettingsFile {
+    let mut file = built_in_for(axis);
+    let rate_hz = file.stage.rate_hz;
+    let own = &mut file.stage.axes[axis as usize];
+    let friction = own.friction.clone();
+    without_law(own, rate_hz);
+    own.friction = friction;
     file
 }
 

@@ -250,7 +250,7 @@ impl Destination {
         let mut file = match (subject.start(Some(path))?, machine) {
             (Some(file), _) => file,
             (None, Some(machine)) => SettingsFile::new(machine),
-            (None, None) => kept::without_laws(),
+            (None, None) => kept::without_laws(axis.into()),
         };
         let start = file.stage.clone();
         change(&mut file.stage.axes[axis.index()]);

@@ -517,6 +517,12 @@ enum LogLevel {
 }
 
 impl LogOptions {
+    /// True if it chooses some of the lines.
+    pub(super) fn chooses(&self) -> bool {
+        let ticks = self.from.or(self.to);
+        self.level != LogLevel::Trace || self.axis.is_some() || ticks.is_some()
+    }
+
     /// The choice of lines.
     pub(super) fn filter(&self) -> LogFilter {
         LogFilter {

@@ -12,6 +12,11 @@ use super::command::{FlashOptions, LogOptions};
 /// Shows the log of a board that runs, until Ctrl-C.
 pub(super) fn log(elf: &PathBuf, arguments: &LogOptions) -> anyhow::Result<()> {
     exists(elf)?;
+    if arguments.chooses() {
+        bail!(
+            "log: --level, --axis, --from and --to choose lines of the link (--port) or of a file (--file), not of a debug probe"
+        );
+    }
     probe_rs(&["attach", "--chip", &arguments.chip], Some(elf))
 }
 

@@ -448,6 +448,17 @@ fn inputs_are_pressed_and_the_supply_is_cut() {
 }
 
 #[test]
+fn lines_of_a_debug_probe_cannot_be_chosen() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("firmware.elf"), "an image").unwrap();
+    let words = ["connect", "log", "--elf", "firmware.elf"];
+    for choice in [["--level", "warn"], ["--axis", "x"], ["--to", "9"]] {
+        let errors = command::fail(folder.path(), &[&words[..], &choice].concat());
+        assert!(errors.contains("not of a debug probe"), "{errors}");
+    }
+}
+
+#[test]
 fn a_flash_file_keeps_what_was_stored_from_one_command_to_the_next() {
     let folder = tempfile::tempdir().unwrap();
     let flash = ["--flash", "settings.flash"];

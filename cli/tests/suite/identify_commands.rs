@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use quadrant_settings::{AxisSettings, StageSettings};
+use quadrant_settings::StageSettings;
 use quadrant_sim::settings_file::SettingsFile;
 use quadrant_sim::stage_setup::StageSetup;
 use quadrant_tune::identify::response::FrequencyResponse;
@@ -145,11 +145,9 @@ fn what_was_measured_is_identified_again_from_its_files() {
     let written = |step: &str, set: &str| {
         let file = SettingsFile::read(&at.join(format!("{step}.toml"))).unwrap();
         assert_eq!(file.provenance[0].sets, [set]);
-        let other = AxisSettings {
-            commissioned: false,
-            ..StageSettings::simulated().axes[1].clone()
-        };
-        assert_eq!(file.stage.axes[1], other);
+        // Nothing is known of the other axes: they have no law.
+        let other = &file.stage.axes[1];
+        assert!(!other.commissioned && other.feedback.pid.kp_v_per_mm == 0.0);
         file.stage.axes[2].clone()
     };
     let z = &StageSettings::simulated().axes[2];

@@ -55,6 +55,6 @@ fn friction_that_holds_an_axis_is_not_taken_for_a_dead_encoder() {
         failed.iter().filter(implausible).count()
     };
     assert_eq!(faults(1.0), 0);
-    // One yields by less than three counts to each step.
-    assert!(faults(2.0) <= 1);
+    // Axes 13 and 16 yield by less than three counts to each step, and are found or not by when the test begins.
+    assert!(faults(2.0) <= 2);
 }

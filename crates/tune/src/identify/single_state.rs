@@ -93,7 +93,11 @@ pub fn fit_lugre(
     Ok(single(parameters, &found, breakaway_v))
 }
 
-/// Friction settings with every model: Dahl and LuGre fitted to the GMS, or absent if they cannot be.
+/// Least stiffness that settings have, V/mm.
+const LEAST_V_PER_MM: f64 = 1e-6;
+
+/// Friction settings with every model: Dahl and LuGre fitted to the GMS, or absent if they cannot be, as where the GMS is that of an axis of
+/// which nobody has measured any.
 pub fn with_all_models(
     sliding: PerDirection<StaticFriction>,
     gms: GmsParameters,
@@ -106,8 +110,14 @@ pub fn with_all_models(
     FrictionSettings {
         sliding,
         smoothed_gms: SmoothedGmsParameters::default(),
-        dahl: dahl.ok().map(|found| found.parameters),
-        lugre: lugre.ok().map(|found| found.parameters),
+        dahl: dahl
+            .ok()
+            .map(|found| found.parameters)
+            .filter(|model| model.stiffness_v_per_mm >= LEAST_V_PER_MM),
+        lugre: lugre
+            .ok()
+            .map(|found| found.parameters)
+            .filter(|model| model.stiffness_v_per_mm >= LEAST_V_PER_MM),
         gms,
     }
 }
@@ -212,6 +222,10 @@ mod tests {
             attraction_v_s: 5.0,
         };
         let settings = with_all_models(sliding, gms);
+        assert_eq!((settings.dahl, settings.lugre), (None, None));
+        // Nobody has measured any before sliding.
+        let unknown = StageSettings::default().axes[0].friction.gms.clone();
+        let settings = with_all_models(sliding, unknown);
         assert_eq!((settings.dahl, settings.lugre), (None, None));
     }
 }
