@@ -38,7 +38,7 @@ unsafe extern "C" {
 /// its mode says: it has left without setting it back.
 pub(crate) fn take(into: &mut [u8], asked: bool) -> usize {
     // SAFETY: `defmt-rtt` defines it, and what changes in it is atomic.
-    let log = unsafe { &*(&raw const _SEGGER_RTT.log) };
+    let log = unsafe { &_SEGGER_RTT.log };
     let (size, read) = (log.size as usize, log.read.load(Ordering::Relaxed) as usize);
     let write = log.write.load(Ordering::Acquire) as usize;
     if read >= size || write >= size {
