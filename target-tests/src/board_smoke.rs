@@ -45,7 +45,7 @@ const EXPECTED: [&str; 6] = [
     "the converter answers 0x0000 instead of 0x0004",
     "quadrant ",
     "no settings are stored",
-    "not commissioned: no axis is, or one with a law is not",
+    "not commissioned: no axis is",
     "10000 control ticks per second, outputs off",
     "hard fault, outputs are off: the stack is full",
 ];
@@ -106,9 +106,15 @@ pub(crate) fn run(toolchain: Toolchain) -> Result<()> {
     for _ in 0..TICKS {
         tick(&mut debugger)?;
     }
+    // The last one has been taken, and ends on a busy host, too.
+    let count = image.variable("TICK")?;
+    let begun = Instant::now();
+    while debugger.word(count)? < TICKS && begun.elapsed() < TIMEOUT {
+        debugger.run(Duration::from_millis(5))?;
+    }
     log.read(&mut debugger)?;
     overflow(&mut debugger, &mut log)?;
-    let ticked = debugger.word(image.variable("TICK")?)?;
+    let ticked = debugger.word(count)?;
     let polled = debugger.word(image.variable("POLLS")?)?;
     println!("{ticked} control ticks, {polled} polls of the server");
     ensure!(
