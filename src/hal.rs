@@ -42,7 +42,7 @@ pub trait Switches {
     fn read(&mut self) -> safety::Switches;
 }
 
-/// What another control puts in by step and direction, in one tick.
+/// Inputs of another control by step and direction, in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PulseReadings {
     /// Steps so far of each axis, 32 bits wide and wrapping; they count backwards while the direction line is on.

@@ -27,7 +27,7 @@ pub(super) fn built_in_for(axis: AxisName) -> SettingsFile {
     file
 }
 
-/// The same without the law of `axis`: what is identified of it is no law.
+/// The same without the law of `axis`, but with its friction, for which a part that is identified stands in: what is identified is no law.
 pub(super) fn without_laws(axis: AxisName) -> SettingsFile {
     let mut file = built_in_for(axis);
     let rate_hz = file.stage.rate_hz;

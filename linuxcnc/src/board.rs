@@ -3,7 +3,7 @@
 use std::io;
 use std::sync::atomic::Ordering;
 
-use quadrant::app::{Control, TimingStatistics};
+use quadrant::app::{Control, Enabling, TimingStatistics};
 use quadrant_law::axes::AxisName;
 use quadrant_law::axis::Commissioning;
 use quadrant_law::command::Command;
@@ -20,8 +20,6 @@ use crate::slow::{self, FastEnds, Place, Report, SlowThread, Wish};
 /// Largest velocity of a command that is one, mm/s.
 const MOST_MM_S: f64 = 1e5;
 
-/// Ticks in which the outputs must have been enabled.
-const ENABLING_TICKS: u32 = 50;
 /// Largest deviation of the thread's period from the settings'.
 const PERIOD_TOLERANCE: f64 = 0.01;
 
@@ -159,8 +157,7 @@ pub struct Board {
     /// Gains that the pins have asked for so far; wraps.
     wishes: u32,
     timing: TimingStatistics,
-    /// Ticks in which the outputs are yet to be enabled.
-    enabling: u32,
+    enabling: Enabling,
     fault: i32,
     /// The number on the pins.
     shown: i32,
@@ -220,7 +217,7 @@ impl Board {
             frames: 0,
             wishes: 0,
             timing: TimingStatistics::default(),
-            enabling: 0,
+            enabling: Enabling::default(),
             fault: 0,
             shown: 0,
             _thread: started.thread,
@@ -383,7 +380,7 @@ impl Board {
             }
         }
         if rose {
-            self.enabling = ENABLING_TICKS;
+            self.enabling.begin();
             self.fault = 0;
         }
         let [shortest, longest] = self.periods_ns;
@@ -392,10 +389,10 @@ impl Board {
         }
         let ends = fell || !any || self.fault != 0;
         if ends {
-            self.enabling = 0;
+            self.enabling.end();
         }
         if let SafetyState::Stopping(fault) | SafetyState::Faulted(fault) = safety
-            && self.enabling == 0
+            && !self.enabling.is_under_way()
             && self.fault == 0
             && any
         {
@@ -409,25 +406,17 @@ impl Board {
         let mut joints = self.joints.iter().flatten();
         if rose && safety.drives() && !joints.any(|joint| joint.hold == Hold::Leads) {
             self.fault = HOST_DRIVES;
-            self.enabling = 0;
+            self.enabling.end();
             return Some(Command::Disable);
         }
-        if self.enabling > 0 {
-            self.enabling -= 1;
-            match safety {
-                SafetyState::Faulted(_) => return Some(Command::ResetFault),
-                SafetyState::Disabled => return Some(Command::Enable),
-                SafetyState::Enabled => self.enabling = 0,
-                SafetyState::Start | SafetyState::Stopping(_) => {}
-            }
-            if self.enabling == 0 && !safety.is_enabled() {
-                self.fault = why_not(pins);
-            }
+        let command = self.enabling.step(safety);
+        if command.is_some() {
+            return command;
         }
         if safety.is_enabled() {
             return self.take_hold();
         }
-        if any && self.enabling == 0 && self.fault == 0 {
+        if any && !self.enabling.is_under_way() && self.fault == 0 {
             self.fault = why_not(pins);
         }
         None
@@ -466,7 +455,7 @@ impl Board {
         let any = self.joints.iter().flatten().any(|joint| joint.was_enabled);
         if self.fault == 0
             && any
-            && self.enabling == 0
+            && !self.enabling.is_under_way()
             && let Some(fault) = safety.fault()
         {
             self.fault = fault.code.number().into();
@@ -474,7 +463,7 @@ impl Board {
         pins.driven = outputs.enabled && !(any && self.fault != 0);
         pins.store_failed = self.ends.store_failed.load(Ordering::Relaxed);
         // While the outputs are being enabled, an old fault is being reset.
-        let fault = if self.fault == 0 && self.enabling == 0 {
+        let fault = if self.fault == 0 && !self.enabling.is_under_way() {
             safety.fault().map_or(0, |fault| fault.code.number().into())
         } else {
             self.fault

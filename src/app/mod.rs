@@ -23,6 +23,7 @@ pub mod capture;
 mod change_detector;
 mod control;
 pub mod crash_record;
+mod enabling;
 pub mod friction_monitor;
 pub mod glitch_monitor;
 mod host_need;
@@ -42,6 +43,7 @@ mod wire;
 
 pub use change_detector::{ChangeDetector, MAX_STATE_CHANGES, StateChange};
 pub use control::Control;
+pub use enabling::Enabling;
 
 pub use host_need::link_timeout_ticks;
 pub use intake::{Intake, Received};

@@ -12,12 +12,9 @@ use quadrant_law::reference::{PulseState, ReferenceSample};
 use quadrant_law::safety::{FaultCode, SafetyState};
 use quadrant_law::scalar::Scalar;
 
-use super::Control;
+use super::{Control, Enabling};
 use crate::drivers::hold_button::HoldButton;
 use crate::hal::{PulseReadings, Pulses};
-
-/// Ticks in which the outputs must have been enabled.
-const ENABLING_TICKS: u32 = 50;
 
 /// The control's hold on an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -40,8 +37,7 @@ pub struct PulseLead<'a, P> {
     servo_on: HoldButton,
     /// The line is on, and counts.
     is_on: bool,
-    /// Ticks in which the outputs are yet to be enabled.
-    enabling: u32,
+    enabling: Enabling,
     holds: PerAxis<Hold>,
 }
 
@@ -53,7 +49,7 @@ impl<'a, P: Pulses> PulseLead<'a, P> {
             states,
             servo_on: HoldButton::new(),
             is_on: false,
-            enabling: 0,
+            enabling: Enabling::default(),
             holds: PerAxis::splat(Hold::Released),
         }
     }
@@ -84,18 +80,18 @@ impl<'a, P: Pulses> PulseLead<'a, P> {
             // Two cannot lead: what a host drives ends, and the control does not take over what it has not seen begin.
             Some(Command::Enable) if safety.drives() => {
                 self.is_on = true;
-                self.enabling = 0;
+                self.enabling.end();
                 self.holds = PerAxis::splat(Hold::Ended);
                 return Some(Command::Disable);
             }
             Some(Command::Enable) => {
                 self.is_on = true;
-                self.enabling = ENABLING_TICKS;
+                self.enabling.begin();
                 self.holds = PerAxis::splat(Hold::Released);
             }
             Some(_) => {
                 self.is_on = false;
-                self.enabling = 0;
+                self.enabling.end();
                 return safety.drives().then_some(Command::Disable);
             }
             None => {}
@@ -103,14 +99,9 @@ impl<'a, P: Pulses> PulseLead<'a, P> {
         if !self.is_on {
             return None;
         }
-        if self.enabling > 0 {
-            self.enabling -= 1;
-            match safety {
-                SafetyState::Faulted(_) => return Some(Command::ResetFault),
-                SafetyState::Disabled => return Some(Command::Enable),
-                SafetyState::Enabled => self.enabling = 0,
-                SafetyState::Start | SafetyState::Stopping(_) => {}
-            }
+        let command = self.enabling.step(safety);
+        if command.is_some() {
+            return command;
         }
         if safety.is_enabled() {
             return self.take_hold(control, follows, &seen);
@@ -120,7 +111,7 @@ impl<'a, P: Pulses> PulseLead<'a, P> {
 
     /// True if the control must not go on: a fault, outputs that could not be enabled, or an axis that no longer follows.
     fn is_alarmed(&self, safety: SafetyState) -> bool {
-        let waits = self.is_on && self.enabling == 0 && !safety.drives();
+        let waits = self.is_on && !self.enabling.is_under_way() && !safety.drives();
         safety.fault().is_some() || waits || self.holds.contains(&Hold::Ended)
     }
 

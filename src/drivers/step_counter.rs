@@ -1,7 +1,7 @@
 //! Steps with a sense, of a counter that only counts upwards: a timer counts the steps, and captures its count at every edge of the
 //! direction line.
 
-/// What a timer shows of step and direction since it was read last.
+/// State of a timer that counts step and direction, since it was read last.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StepReading {
     /// The direction line, read before the rest: true while it is on.

@@ -52,7 +52,7 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
     }
     let late = page(&mut bench, &mut client, next)?;
     report.row(
-        "bytes that a host is told it is too late for",
+        "bytes that a host was too late for",
         format!("{}", total.wrapping_sub(next) - KEPT),
         late.from.wrapping_sub(next),
         late.from.wrapping_sub(next) == total.wrapping_sub(next) - KEPT,

@@ -20,6 +20,9 @@ const LOOK: Duration = Duration::from_millis(50);
 
 /// Prints the lines that have come since the last call; with `follow`, until Ctrl-C.
 pub(super) fn run(session: &mut Session, options: &LogOptions) -> anyhow::Result<Answer> {
+    if options.file.is_some() {
+        bail!("log --file: this is for the shell, and needs no connection");
+    }
     let filter = options.filter();
     if let Some(elf) = &options.elf {
         session.log = Some(LogDecoder::of_image(elf).context("log")?);

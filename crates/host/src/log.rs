@@ -89,7 +89,7 @@ impl LogDecoder {
             lines.push(if missing > 0 {
                 format!("({missing} bytes of the log were lost)")
             } else {
-                "(the board has started anew)".to_owned()
+                "(the board has restarted)".to_owned()
             });
         }
         self.next = page.from.wrapping_add(page.bytes.len() as u32);

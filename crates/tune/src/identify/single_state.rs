@@ -12,6 +12,7 @@ use quadrant_law::friction::gms::GmsParameters;
 use quadrant_law::friction::lugre::LugreParameters;
 use quadrant_law::friction::smoothed_gms::SmoothedGmsParameters;
 use quadrant_law::friction::stribeck::StaticFriction;
+use quadrant_settings::leaves::LEAST_STIFFNESS_V_PER_MM;
 
 use super::fit::{Fit, FitError, Loss, Parameter, fit};
 
@@ -93,9 +94,6 @@ pub fn fit_lugre(
     Ok(single(parameters, &found, breakaway_v))
 }
 
-/// Least stiffness that settings have, V/mm.
-const LEAST_V_PER_MM: f64 = 1e-6;
-
 /// Friction settings with every model: Dahl and LuGre fitted to the GMS, or absent if they cannot be, as where the GMS is that of an axis of
 /// which nobody has measured any.
 pub fn with_all_models(
@@ -113,11 +111,11 @@ pub fn with_all_models(
         dahl: dahl
             .ok()
             .map(|found| found.parameters)
-            .filter(|model| model.stiffness_v_per_mm >= LEAST_V_PER_MM),
+            .filter(|model| model.stiffness_v_per_mm >= LEAST_STIFFNESS_V_PER_MM),
         lugre: lugre
             .ok()
             .map(|found| found.parameters)
-            .filter(|model| model.stiffness_v_per_mm >= LEAST_V_PER_MM),
+            .filter(|model| model.stiffness_v_per_mm >= LEAST_STIFFNESS_V_PER_MM),
         gms,
     }
 }
