@@ -109,6 +109,9 @@ pub struct FeedforwardSettings {
     /// Largest velocity of motions to and fro on which no friction is fed forward, mm/s; from twice that on, all of it is.
     #[serde(default)]
     pub from_mm_s: f64,
+    /// Longest stroke of motions to and fro on which no friction is fed forward, mm; from twice that on, all of it is.
+    #[serde(default)]
+    pub from_mm: f64,
     /// Learning of the friction's scale while the axis works; none: the scale stays 1.
     #[serde(default)]
     pub learning: Option<LearningSettings>,

@@ -241,7 +241,8 @@ impl AxisSettings {
                     limits.following_error_mm / encoder.resolution_mm,
                     period_s,
                 )
-                .feeding_from(feedforward.from_mm_s * period_s / encoder.resolution_mm),
+                .feeding_from(feedforward.from_mm_s * period_s / encoder.resolution_mm)
+                .feeding_beyond(feedforward.from_mm / encoder.resolution_mm),
             )
             .learning(self.build_learning(period_s))
             .cancelling(cancelling.as_ref().map(|(settings, of)| (settings, of)))

@@ -232,6 +232,7 @@ impl Default for FeedforwardSettings {
             },
             preview_s: default!("feedforward.preview_s"),
             from_mm_s: default!("feedforward.from_mm_s"),
+            from_mm: default!("feedforward.from_mm"),
             learning: None,
             cancelling: None,
         }

@@ -139,6 +139,7 @@ fn axis(parameters: &Parameters) -> AxisSettings {
             kind: FeedforwardKind::Combined,
             preview_s: parameters.plant.delay_s,
             from_mm_s: 0.0,
+            from_mm: 0.0,
             learning: None,
             cancelling: None,
             ..FeedforwardSettings::default()

@@ -9,8 +9,9 @@
 //!   strokes, or 20 s. After the third time it stays off until the settings change or the outputs are off. If it was not the cause, now or
 //!   while it is off, the axis is shaken from outside: the feedforward returns at once, and there is no other trial for a minute. It also
 //!   returns at once with a stroke more than twice as long, in which it need not harm.
-//! - **Slow motions**, where the settings say that friction fed forward does harm there: it fades within 50 ms by the largest speed of the
-//!   reference in this stroke and the one before, so that a reversal of a fast motion still has all of it.
+//! - **Slow or short motions**, where the settings say that friction fed forward does harm there: it fades within 50 ms by the largest speed
+//!   of the reference in this stroke and the one before, and by the longer one of both, so that a reversal of a fast or long motion still
+//!   has all of it. After a second at rest, a motion is slow until it is fast, and long until it turns.
 //! - **Hum.** At rest, the error swings evenly at 20 Hz or more for a second. It is reported, and nothing is done.
 //! - **Instability.** The error swings evenly for a second, each time by more than a limit and by more than twice the distance
 //!   that the reference goes meanwhile. That is a fault.
@@ -90,11 +91,20 @@ pub struct Oscillation<S: Scalar> {
     window_looks: u32,
     /// Swing that is a fault, counts; the largest number for none.
     unstable_counts: u32,
-    /// Speed of strokes on which no friction is fed forward, 2^-16 counts a tick, and steps for each unit above it, 2^-24.
-    slow: u32,
-    steps_per_speed: u32,
+    /// Speed of strokes on which no friction is fed forward, 2^-16 counts a tick, and their length, counts.
+    slow: Fading,
+    short: Fading,
     /// Share of what is added in a step.
     share: S::Gain,
+}
+
+/// Fading of the friction feedforward by a quantity.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Fading {
+    /// Largest value at which none is fed forward; all of it from twice that on. 0: it does not fade.
+    from: u32,
+    /// Steps for each unit above it, 2^-24.
+    steps_per_unit: u32,
 }
 
 /// Kind of an oscillation that was found.
@@ -164,7 +174,7 @@ pub struct OscillationState {
     reduced: u8,
     /// The same because the motion is slow.
     faded: u8,
-    speeds: Speeds,
+    pace: Pace,
     phase: Phase,
     /// Looks in the phase, and until the next trial.
     looks: u32,
@@ -182,12 +192,17 @@ pub struct OscillationState {
     reading: OscillationReading,
 }
 
-/// Largest speeds of the reference, 2^-16 counts a tick: in this stroke and the one before.
+/// Largest speeds of the reference, 2^-16 counts a tick, and its ways, counts: in this stroke and the one before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Speeds {
+struct Pace {
+    /// Sense of the stroke; 0 after a rest.
     sense: i8,
     most: u32,
     most_before: u32,
+    /// Position at which the stroke began, counts.
+    from: i32,
+    way: u32,
+    way_before: u32,
     /// Looks since it came to rest.
     rested: u32,
 }
@@ -264,8 +279,8 @@ impl<S: Scalar> Oscillation<S> {
             trial_looks: looks(TRIAL_S),
             window_looks: looks(WINDOW_S),
             unstable_counts: rounding::round(unstable_counts) as u32,
-            slow: 0,
-            steps_per_speed: 0,
+            slow: Fading::default(),
+            short: Fading::default(),
             share: S::gain(1.0 / steps, Quantity::Integer, Quantity::Multiplier),
         }
     }
@@ -274,12 +289,14 @@ impl<S: Scalar> Oscillation<S> {
     /// time only.
     #[must_use]
     pub fn feeding_from(mut self, counts_per_tick: f64) -> Self {
-        let slow = rounding::round(counts_per_tick * ONE_COUNT).min(f64::from(u32::MAX / 2));
-        self.slow = slow as u32;
-        // Rounded up: what is left at no speed is nothing.
-        self.steps_per_speed =
-            rounding::ceil(f64::from(REDUCTION_STEPS) * STEPS_SCALE / slow.max(1.0))
-                .min(f64::from(u32::MAX)) as u32;
+        self.slow = Fading::from(counts_per_tick * ONE_COUNT);
+        self
+    }
+
+    /// The same by the length of strokes, counts. Settings time only.
+    #[must_use]
+    pub fn feeding_beyond(mut self, counts: f64) -> Self {
+        self.short = Fading::from(counts);
         self
     }
 
@@ -318,40 +335,46 @@ impl<S: Scalar> Oscillation<S> {
         let reference = input.reference as i32;
         if self.feeds_friction {
             self.follow(state, error, reference, input.sense);
-            if self.slow > 0 {
-                self.fade(state, input.sense, input.speed);
+            if self.slow.from | self.short.from > 0 {
+                self.fade(state, reference, input.sense, input.speed);
             }
         }
         self.count(state, error, reference, input.sense != 0)
     }
 
-    /// Fades the friction feedforward by the largest speed in this stroke and the one before; at rest it stays.
+    /// Fades the friction feedforward by the largest speed, and by the way, in this stroke and the one before; at rest it stays.
     #[cold]
     #[inline(never)]
-    fn fade(&self, state: &mut OscillationState, sense: i8, speed: u32) {
-        let speeds = &mut state.speeds;
+    fn fade(&self, state: &mut OscillationState, reference: i32, sense: i8, speed: u32) {
+        let pace = &mut state.pace;
         if sense == 0 {
-            speeds.rested = speeds.rested.saturating_add(1);
-            if speeds.rested >= self.window_looks {
-                (speeds.most, speeds.most_before) = (0, 0);
+            pace.rested = pace.rested.saturating_add(1);
+            if pace.rested >= self.window_looks {
+                pace.sense = 0;
             }
             return;
         }
-        speeds.rested = 0;
-        if sense != speeds.sense {
-            speeds.sense = sense;
-            speeds.most_before = core::mem::replace(&mut speeds.most, 0);
+        pace.rested = 0;
+        if sense != pace.sense {
+            let after_rest = pace.sense == 0;
+            pace.sense = sense;
+            pace.from = reference;
+            (pace.most_before, pace.way_before) = if after_rest {
+                (0, u32::MAX)
+            } else {
+                (pace.most, pace.way)
+            };
+            (pace.most, pace.way) = (0, 0);
         }
-        speeds.most = speeds.most.max(speed);
-        let fastest = speeds.most.max(speeds.most_before);
-        let missing = (self.slow * 2).saturating_sub(fastest).min(self.slow);
-        let steps = (u64::from(missing) * u64::from(self.steps_per_speed)) >> STEPS_SHIFT;
-        let wanted = steps.min(u64::from(REDUCTION_STEPS)) as u8;
+        pace.most = pace.most.max(speed);
+        pace.way = reference.wrapping_sub(pace.from).unsigned_abs();
+        let slow = self.slow.steps(pace.most.max(pace.most_before));
+        let short = self.short.steps(pace.way.max(pace.way_before));
         let (least, most) = (
             state.faded.saturating_sub(self.steps_per_look),
             state.faded.saturating_add(self.steps_per_look),
         );
-        state.faded = wanted.clamp(least, most);
+        state.faded = slow.max(short).clamp(least, most);
     }
 
     /// Follows the strokes of the reference, and reduces or restores the friction feedforward.
@@ -502,6 +525,26 @@ impl<S: Scalar> Oscillation<S> {
             looks_per_s: self.window_looks,
             swings,
         };
+    }
+}
+
+impl Fading {
+    fn from(value: f64) -> Self {
+        let from = rounding::round(value).min(f64::from(u32::MAX / 2));
+        Self {
+            from: from as u32,
+            // Rounded up: what is left at 0 is nothing.
+            steps_per_unit: rounding::ceil(f64::from(REDUCTION_STEPS) * STEPS_SCALE / from.max(1.0))
+                .min(f64::from(u32::MAX)) as u32,
+        }
+    }
+
+    /// Steps by which the friction feedforward is reduced at a value.
+    #[inline(always)]
+    fn steps(self, value: u32) -> u8 {
+        let missing = (self.from * 2).saturating_sub(value).min(self.from);
+        let steps = (u64::from(missing) * u64::from(self.steps_per_unit)) >> STEPS_SHIFT;
+        steps.min(u64::from(REDUCTION_STEPS)) as u8
     }
 }
 

@@ -513,6 +513,37 @@ fn an_axis_whose_settings_say_nothing_of_slow_motions_feeds_friction_forward_on_
 }
 
 #[test]
+fn friction_is_fed_forward_on_strokes_beyond_a_length_and_on_the_first_one_after_a_rest() {
+    // Nothing up to 100 counts, all from 200 on.
+    let mut shown = Shown {
+        monitor: Oscillation::new(true, 1e6, 1e-4).feeding_beyond(100.0),
+        state: OscillationState::default(),
+        forth: false,
+        speed: 1,
+    };
+    for (way, share) in [(80, 1.0), (80, 0.0), (1000, 1.0), (80, 1.0), (80, 0.0)] {
+        shown.strokes(1, way, 10);
+        assert_eq!(shown.acts(), share, "{way}");
+    }
+    shown.strokes(2, 150, 10);
+    assert!((shown.acts() - 0.5).abs() < 0.03, "{}", shown.acts());
+    shown.strokes(2, 80, 10);
+    let at_rest = OscillationInput {
+        error: 0,
+        reference: 0,
+        sense: 0,
+        speed: 0,
+        excited: false,
+    };
+    for _ in 0..2 * 2500 {
+        shown.monitor.step(&mut shown.state, at_rest);
+    }
+    // Nobody knows how long it will be.
+    shown.strokes(1, 80, 10);
+    assert_eq!(shown.acts(), 1.0, "from rest");
+}
+
+#[test]
 fn nothing_of_the_friction_is_fed_forward_on_slow_motions_whatever_the_speed_in_the_settings() {
     for thousandths in [1, 7, 40, 80, 160, 320, 400, 3000, 17_000] {
         let mut shown = Shown {

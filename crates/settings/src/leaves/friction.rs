@@ -73,6 +73,8 @@ pub(super) const LEAVES: &[LeafInfo] = &[
         "Look-ahead of the feedforward over the feedback's reference: the plant's delay."),
     number("feedforward.from_mm_s", "mm/s", at(0.0), at(1000.0), 0.0,
         "Largest velocity of motions to and fro on which no friction is fed forward; from twice that on, all of it is. 0: on all motions."),
+    number("feedforward.from_mm", "mm", at(0.0), at(100.0), 0.0,
+        "Longest stroke of motions to and fro on which no friction is fed forward; from twice that on, all of it is. 0: on all motions."),
     number("feedforward.learning.memory_s", "s", at(1.0), at(100.0), LearningSettings::DEFAULT.memory_s,
         "Time constant with which learning of the friction's scale forgets; left out with its part, nothing is learnt."),
     number("feedforward.learning.vibration_mm_s", "mm/s", at(0.1), at(1000.0), LearningSettings::DEFAULT.vibration_mm_s,

@@ -216,16 +216,24 @@ fn verdict(trials: &Verification) -> Vec<String> {
 /// The reason why a law was not chosen.
 fn refusal(refused: &Refused) -> String {
     let law = &refused.law;
-    let Some(worst) = refused.worst else {
+    let Some(worse) = refused.worse else {
         return format!("{law} was stopped");
     };
     let WorseSine {
         sine,
         largest_mm,
         pid_mm,
-    } = worst;
+    } = worse;
+    let excess = if refused.factor > 1.0 {
+        format!(
+            ", with {:.0} % too much friction,",
+            100.0 * (refused.factor - 1.0)
+        )
+    } else {
+        String::new()
+    };
     format!(
-        "{law} leaves {:.1} um for {:.1} ({:.2} mm at {:.1} mm/s)",
+        "{law}{excess} leaves {:.1} um for {:.1} ({:.2} mm at {:.1} mm/s)",
         1e3 * largest_mm,
         1e3 * pid_mm,
         sine.amplitude_mm,

@@ -212,7 +212,73 @@ fn a_law_that_is_stopped_on_small_slow_motions_leaves_the_pid_alone() {
         "{:?}",
         verification.chosen().law
     );
-    assert!(verification.refused.iter().any(|law| law.worst.is_none()));
+    assert!(verification.refused.iter().any(|law| law.worse.is_none()));
+}
+
+/// An axis that is thrown at short motions by more friction fed forward than at any long one before.
+struct ThrownByTooMuch {
+    axis: SimulatedTestAxis,
+    level: f64,
+}
+
+impl TestAxis for ThrownByTooMuch {
+    fn info(&self) -> AxisInfo {
+        self.axis.info()
+    }
+
+    fn settings(&self) -> &AxisSettings {
+        self.axis.settings()
+    }
+
+    fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
+        self.axis.apply(settings)
+    }
+
+    fn perform(
+        &mut self,
+        experiment: &Experiment,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Recording, ExperimentError> {
+        let mut recording = self.axis.perform(experiment, progress)?;
+        let Driven::ClosedLoop(MotionSettings::Harmonic(sine)) = &experiment.drive else {
+            return Ok(recording);
+        };
+        let feedforward = &self.settings().feedforward;
+        let level = match feedforward.kind {
+            FeedforwardKind::None => 0.0,
+            _ if 2.0 * sine.amplitude_mm <= feedforward.from_mm => 0.0,
+            _ => feedforward.gains.level,
+        };
+        if sine.amplitude_mm > 0.1 {
+            self.level = self.level.max(level);
+        } else if level > 1.05 * self.level {
+            for position_mm in &mut recording.position_mm {
+                *position_mm += 1.0;
+            }
+        }
+        Ok(recording)
+    }
+}
+
+#[test]
+fn a_law_that_a_little_less_friction_would_make_worse_than_the_pid_is_replaced_by_one_with_a_margin()
+ {
+    let base = StageSettings::simulated().axes[0].clone();
+    let mut settings = commissioned(x(), 200.0).settings;
+    settings.limits = base.limits;
+    settings.feedforward.learning = None;
+    let mut axis = ThrownByTooMuch {
+        axis: SimulatedTestAxis::new(0, x(), 2),
+        level: 0.0,
+    };
+    let verification =
+        quadrant_tune::commission::verify::verify(&mut axis, &settings, &mut |_| {}).unwrap();
+    let refused = &verification.refused[0];
+    assert_eq!(refused.factor, 1.15);
+    assert!(refused.worse.unwrap().largest_mm > 0.9, "{refused:?}");
+    assert!(verification.is_better_than_pid());
+    let chosen = &verification.settings(&base).feedforward;
+    assert!((0.1..0.12).contains(&chosen.from_mm), "{chosen:?}");
 }
 
 #[test]

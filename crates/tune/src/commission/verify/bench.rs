@@ -53,7 +53,6 @@ impl Bench<'_> {
             rings: Vec::new(),
             is_share: false,
             at_s: Vec::new(),
-            small: Vec::new(),
             settings,
         };
         let stopped = self.run(&mut result, count);
@@ -95,22 +94,29 @@ impl Bench<'_> {
         None
     }
 
-    /// Runs a law that was not stopped on the small slow sines, as far as it has not run on them.
+    /// Runs settings under the name of a law on small slow sines, until one is `enough`: their scores. They stay in force.
     ///
     /// # Errors
     /// A run that is stopped, and settings that are refused.
-    pub(super) fn run_small(&mut self, result: &mut LawResult) -> Result<(), VerifyError> {
-        if result.stopped.is_some() {
-            return Ok(());
-        }
-        self.test_axis.apply(&result.settings)?;
-        let small_sines = self.small_sines;
-        for small in &small_sines[result.small.len()..] {
-            if let Some((score, _)) = self.run_one(result, small.sine, small.scored_cycles)? {
-                result.small.push(score);
+    pub(super) fn run_small(
+        &mut self,
+        result: &mut LawResult,
+        settings: &AxisSettings,
+        sines: &[SmallSine],
+        enough: impl Fn(usize, &Score) -> bool,
+    ) -> Result<Vec<Score>, VerifyError> {
+        self.test_axis.apply(settings)?;
+        let mut scores = Vec::new();
+        for (index, small) in sines.iter().enumerate() {
+            let Some((score, _)) = self.run_one(result, small.sine, small.scored_cycles)? else {
+                break;
+            };
+            scores.push(score);
+            if enough(index, &score) {
+                break;
             }
         }
-        Ok(())
+        Ok(scores)
     }
 
     /// Runs the law in force on a sine; nothing where a person has ended the trials. The error that stops it is kept.

@@ -33,8 +33,6 @@ pub struct LawResult {
     pub law: String,
     /// Its scores, on the measured position, sine by sine as far as it ran.
     pub scores: Vec<Score>,
-    /// Its scores on the small slow sines, as far as it ran on them.
-    pub small: Vec<Score>,
     /// Recording of the first sine's scored cycles.
     pub recording: Recording,
     /// The reason why the axis was stopped, if it was.
@@ -220,7 +218,6 @@ mod tests {
             rings: recordings.iter().filter_map(lasting).collect(),
             is_share: false,
             at_s: vec![0.0; scores.len()],
-            small: Vec::new(),
             settings,
         }
     }

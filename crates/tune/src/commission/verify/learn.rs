@@ -25,9 +25,8 @@ impl Trials<'_, '_> {
         else {
             return Ok(chosen);
         };
-        let _ = self.bench.run_small(&mut found);
         let was_refused = self.refused.iter().any(|refused| refused.law == fixed.law);
-        let is_refused = self.refuses_when_small(&found);
+        let is_refused = self.refuses_when_small(&mut found);
         let [(fixed_worst, fixed_mean), (worst, mean)] =
             [&fixed, &found].map(|law| self.against_pid(law));
         let is_worse = is_refused && !was_refused

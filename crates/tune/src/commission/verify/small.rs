@@ -3,28 +3,36 @@
 //! The level of friction that is fed forward at the slow speed of the reference is more than a table needs once it breaks away. What is
 //! left over, divided by the stiffness of a soft loop, throws the axis. The same level at every speed, below what sliding keeps, takes the
 //! throw away and loses least on other motions. Where it is not enough, or an axis that noise shakes meets hardly any friction when slow,
-//! none is fed forward on slow motions.
+//! none is fed forward on slow motions. Where strokes are so short that the PID sticks, it leaves no more than a stroke, and what friction
+//! is fed forward has to be exact to gain anything: there none is, if that is the harm.
 
 use quadrant_settings::AxisSettings;
+use quadrant_sim::metrics::Score;
 use quadrant_sim::sine_test::SineTest;
 
 use super::VerifyError;
 use super::law_result::{LawResult, MAX_ERROR_RATIO, MAX_SCATTER_RATIO};
-use super::sines::{CHOICE_SINES, SmallSine};
+use super::sines::{CHOICE_SINES, MARGIN_SINES, SmallSine};
 use super::trials::Trials;
-use super::variants::{feeding_from, flattened};
+use super::variants::{feeding_beyond, feeding_from, flattened, with_friction};
 
 /// Largest excess of a largest error over the PID's that counts as none, counts: one, by which that of an axis that sticks scatters, and
 /// what rounding adds.
 const MAX_EXCESS_COUNTS: f64 = 1.1;
+
+/// Factor on the friction fed forward with which a law is not to be worse either, on the short sines: friction falls by as much where an
+/// axis warms, or its lubricant spreads.
+const MARGIN: f64 = 1.15;
 
 /// A law that was worse than the PID on a small slow sine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Refused {
     /// Its name.
     pub law: String,
-    /// The sine on which it was worst; none where it was stopped.
-    pub worst: Option<WorseSine>,
+    /// Factor on its friction with which it was.
+    pub factor: f64,
+    /// The sine on which it was worse; none where it was stopped.
+    pub worse: Option<WorseSine>,
 }
 
 /// Errors on a sine on which a law is worse than the PID.
@@ -57,6 +65,13 @@ pub(super) const REMEDIES: [Remedy; 4] = [
     Remedy::From(FROM_MM_S),
     Remedy::LinearFrom(FROM_MM_S),
 ];
+
+/// Longest stroke up to which no friction is fed forward, over that of the sine on which it was worse.
+const STROKE_ROOM: f64 = 1.1;
+/// Longest stroke up to which no friction is fed forward, mm: less friction is the remedy of what is worse on longer ones.
+const MOST_STROKE_MM: f64 = 0.12;
+/// Part of such a law's name before the length.
+const STROKES: &str = ", strokes from ";
 
 /// Velocity that no small slow sine exceeds, mm/s.
 const FROM_MM_S: f64 = 1.6;
@@ -97,15 +112,22 @@ impl Trials<'_, '_> {
         if chosen == 0 {
             return Ok(0);
         }
-        self.bench.run_small(&mut self.laws[0])?;
-        // One that is stopped is refused.
-        let _ = self.bench.run_small(&mut self.laws[chosen]);
-        let law = self.laws[chosen].clone();
-        if !self.refuses_when_small(&law) {
+        let (pid, sines) = (&mut self.laws[0], self.bench.small_sines);
+        self.pid_when_small = self.bench.run_small(pid, &self.pid, sines, |_, _| false)?;
+        let mut law = self.laws[chosen].clone();
+        if !self.refuses_when_small(&mut law) {
             return Ok(chosen);
         }
+        self.laws[chosen] = law.clone();
         if !law.feeds_forward() {
             return Ok(0);
+        }
+        while let Some(mut beyond) = self.beyond_refused_stroke(&law) {
+            if !self.refuses_when_small(&mut beyond) {
+                self.laws.push(beyond);
+                return Ok(self.laws.len() - 1);
+            }
+            law = beyond;
         }
         for remedy in REMEDIES {
             let found = self.try_remedy(remedy, &law)?;
@@ -113,7 +135,25 @@ impl Trials<'_, '_> {
                 return Ok(found);
             }
         }
-        Ok(if law.stopped.is_some() { 0 } else { chosen })
+        let stopped = self.laws[chosen].stopped.is_some();
+        Ok(if stopped { 0 } else { chosen })
+    }
+
+    /// A law that feeds friction forward beyond the stroke on which it was refused, where that is a short one, and the usual sines are so much
+    /// longer that it does on them what it did.
+    fn beyond_refused_stroke(&self, law: &LawResult) -> Option<LawResult> {
+        let sine = self.refused.last()?.worse?.sine;
+        let from_mm = STROKE_ROOM * 2.0 * sine.amplitude_mm;
+        let is_longer = |usual: &SineTest| usual.amplitude_mm >= from_mm;
+        let tries = from_mm > law.settings.feedforward.from_mm
+            && from_mm <= MOST_STROKE_MM
+            && self.bench.sines.iter().all(is_longer);
+        let whole = law.law.split(STROKES).next()?;
+        tries.then(|| LawResult {
+            law: format!("{whole}{STROKES}{from_mm:.3} mm on"),
+            settings: feeding_beyond(&law.settings, from_mm),
+            ..law.clone()
+        })
     }
 
     /// Runs a changed law; its index if it is chosen, else the PID's.
@@ -124,9 +164,6 @@ impl Trials<'_, '_> {
         let Ok((mut found, _)) = self.bench.try_law(&name, &settings, 0) else {
             return Ok(0);
         };
-        if self.bench.run_small(&mut found).is_err() {
-            return Ok(0);
-        }
         let from_mm_s = settings.feedforward.from_mm_s;
         let is_linear = settings.feedback == self.pid.feedback;
         let is_pid = |sine: &SineTest| is_linear && sine.velocity_mm_s <= from_mm_s;
@@ -136,7 +173,8 @@ impl Trials<'_, '_> {
             .small_sines
             .iter()
             .all(|small| is_pid(&small.sine));
-        if !same && self.refuses_when_small(&found) {
+        let refused = self.refuses_when_small(&mut found);
+        if found.stopped.is_some() || refused && !same {
             return Ok(0);
         }
         if from_mm_s == 0.0 {
@@ -162,84 +200,89 @@ impl Trials<'_, '_> {
         })
     }
 
-    /// True if a law that ran on the small sines is worse than the PID there; it is added to those that were refused.
-    pub(super) fn refuses_when_small(&mut self, law: &LawResult) -> bool {
-        let worst = worst_when_small(law, &self.laws[0], self.bench.small_sines);
-        let is_refused = worst.is_some() || law.stopped.is_some();
-        if is_refused {
-            self.refused.push(Refused {
-                law: law.law.clone(),
-                worst,
-            });
+    /// Runs a law on the small sines; true if it is worse than the PID on one, at which it ends, or is stopped. One that is worse on none
+    /// runs on the short ones again, with too much of its friction. What is refused is added to those that were.
+    pub(super) fn refuses_when_small(&mut self, law: &mut LawResult) -> bool {
+        let sines = self.bench.small_sines;
+        let feeds = law.feeds_forward() && law.settings.feedforward.from_mm_s < FROM_MM_S;
+        let margin = feeds.then_some((MARGIN, &sines[..MARGIN_SINES]));
+        for (factor, sines) in [(1.0, sines)].into_iter().chain(margin) {
+            let worse = self.run_small(law, factor, sines);
+            if worse.is_some() || law.stopped.is_some() {
+                self.refused.push(Refused {
+                    law: law.law.clone(),
+                    factor,
+                    worse,
+                });
+                return true;
+            }
         }
-        is_refused
+        false
+    }
+
+    /// Runs a law with a factor on its friction on small sines, until it is worse than the PID on one: that.
+    fn run_small(
+        &mut self,
+        law: &mut LawResult,
+        factor: f64,
+        sines: &[SmallSine],
+    ) -> Option<WorseSine> {
+        if law.stopped.is_some() {
+            return None;
+        }
+        let settings = with_friction(&law.settings, factor);
+        let count_mm = settings.encoder.resolution_mm;
+        let pid = &self.pid_when_small;
+        let worse = |index: usize, own: &Score| {
+            let pid = pid.get(index)?;
+            is_worse(own, pid, count_mm).then_some(WorseSine {
+                sine: sines[index].sine,
+                largest_mm: own.largest_mm,
+                pid_mm: pid.largest_mm,
+            })
+        };
+        let enough = |index: usize, own: &Score| worse(index, own).is_some();
+        // More friction may make a model too stiff for the control rate: it has no margin to be tried.
+        let scores = self.bench.run_small(law, &settings, sines, enough).ok()?;
+        worse(scores.len().checked_sub(1)?, scores.last()?)
     }
 }
 
-/// The small sine on which a law is worse than the PID by most, if there is one.
-fn worst_when_small(law: &LawResult, pid: &LawResult, sines: &[SmallSine]) -> Option<WorseSine> {
-    let least_mm = MAX_EXCESS_COUNTS * law.settings.encoder.resolution_mm;
-    let runs = sines.iter().zip(law.small.iter().zip(&pid.small));
-    let worse = runs.map(|(small, (own, pid))| WorseSine {
-        sine: small.sine,
-        largest_mm: own.largest_mm,
-        pid_mm: pid.largest_mm,
-    });
-    let ratio = |worse: &WorseSine| worse.largest_mm / worse.pid_mm;
-    worse
-        .filter(|worse| worse.largest_mm - worse.pid_mm > least_mm)
-        .max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
+/// True if a largest error exceeds the PID's by more than chance.
+fn is_worse(own: &Score, pid: &Score, count_mm: f64) -> bool {
+    own.largest_mm - pid.largest_mm > MAX_EXCESS_COUNTS * count_mm
 }
 
 #[cfg(test)]
 mod tests {
     use quadrant_settings::{FeedbackSettings, StageSettings};
-    use quadrant_sim::metrics::Score;
 
-    use super::super::sines::SMALL_SINES;
     use super::*;
     use crate::record::Recording;
 
-    /// A law with a largest error on each of the first small sines, in counts.
-    fn law(largest_counts: &[f64]) -> LawResult {
-        let settings = StageSettings::simulated().axes[0].clone();
-        let count_mm = settings.encoder.resolution_mm;
-        LawResult {
+    #[test]
+    fn a_law_is_worse_where_its_largest_error_exceeds_the_pids_by_more_than_a_count() {
+        let score = |counts: f64| Score {
+            largest_mm: 1e-3 * counts,
+            rms_mm: 0.0,
+            glitch_mm: 0.0,
+        };
+        assert!(!is_worse(&score(41.0), &score(40.0), 1e-3));
+        assert!(is_worse(&score(41.2), &score(40.0), 1e-3));
+    }
+
+    #[test]
+    fn each_remedy_feeds_less_friction_forward_when_slow_and_as_much_when_fast() {
+        let law = LawResult {
             law: "a law".to_owned(),
             scores: Vec::new(),
-            small: largest_counts
-                .iter()
-                .map(|counts| Score {
-                    largest_mm: counts * count_mm,
-                    rms_mm: counts * count_mm,
-                    glitch_mm: 0.0,
-                })
-                .collect(),
             recording: Recording::default(),
             stopped: None,
             rings: Vec::new(),
             is_share: false,
             at_s: Vec::new(),
-            settings,
-        }
-    }
-
-    #[test]
-    fn a_law_is_worse_where_its_largest_error_exceeds_the_pids_by_more_than_a_count() {
-        let pid = law(&[40.0, 60.0]);
-        let worst = |counts: [f64; 2]| {
-            worst_when_small(&law(&counts), &pid, &SMALL_SINES).map(|worst| worst.sine)
+            settings: StageSettings::simulated().axes[0].clone(),
         };
-        assert_eq!(worst([41.0, 61.0]), None);
-        assert_eq!(worst([41.2, 10.0]), Some(SMALL_SINES[0].sine));
-        // By ratio, not by the difference.
-        assert_eq!(worst([60.0, 85.0]), Some(SMALL_SINES[0].sine));
-        assert_eq!(worst([60.0, 95.0]), Some(SMALL_SINES[1].sine));
-    }
-
-    #[test]
-    fn each_remedy_feeds_less_friction_forward_when_slow_and_as_much_when_fast() {
-        let law = law(&[]);
         let pid = AxisSettings {
             feedback: FeedbackSettings {
                 nonlinear: None,

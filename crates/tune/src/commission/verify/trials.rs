@@ -3,12 +3,13 @@
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::learning::LearningSettings;
 use quadrant_settings::AxisSettings;
+use quadrant_sim::metrics::Score;
 
 use super::super::bootstrap::measuring_settings;
 use super::super::drift::Drift;
 use super::bench::Bench;
 use super::law_result::{LawResult, MAX_ERROR_RATIO, MAX_SCATTER_RATIO};
-use super::sines::{CHOICE_SINES, COMPARISON_SINES, SINES, SMALL_SINES};
+use super::sines::{CHOICE_SINES, COMPARISON_SINES, MARGIN_SINES, SINES, SMALL_SINES};
 use super::small::{REMEDIES, Refused};
 use super::variants::{over_range, with_friction, with_kind};
 use super::{Verification, VerifyError};
@@ -58,8 +59,9 @@ pub(super) const MOST_RUNS: usize = {
     let scaled = CHOICE_SINES;
     let confirmed = (1 + MAX_CANDIDATES) * withheld;
     let instead = kinds * (SINES.len() - COMPARISON_SINES) + shares * SINES.len();
-    let small = (2 + REMEDIES.len()) * SMALL_SINES.len() + REMEDIES.len() * SINES.len();
-    let learning = SINES.len() + SMALL_SINES.len();
+    let all_small = SMALL_SINES.len() + MARGIN_SINES;
+    let small = (2 + REMEDIES.len()) * all_small + REMEDIES.len() * SINES.len();
+    let learning = SINES.len() + all_small;
     alone + compared + refined + scaled + confirmed + instead + small + learning
 };
 
@@ -79,6 +81,8 @@ pub(super) struct Trials<'a, 'b> {
     kinds: Vec<LawResult>,
     /// The same that make the axis jump.
     jumping: Vec<LawResult>,
+    /// The PID's scores on the small slow sines, once it has run on them.
+    pub(super) pid_when_small: Vec<Score>,
     /// Laws that were worse than the PID on a small slow sine.
     pub(super) refused: Vec<Refused>,
     pub(super) drift: Drift,
@@ -123,6 +127,7 @@ impl<'a, 'b> Trials<'a, 'b> {
             laws,
             kinds: Vec::new(),
             jumping: Vec::new(),
+            pid_when_small: Vec::new(),
             refused: Vec::new(),
             drift,
         })

@@ -60,6 +60,13 @@ pub(super) fn feeding_from(settings: &AxisSettings, from_mm_s: f64) -> AxisSetti
     changed
 }
 
+/// The same settings with friction fed forward on strokes beyond a length, mm.
+pub(super) fn feeding_beyond(settings: &AxisSettings, from_mm: f64) -> AxisSettings {
+    let mut changed = settings.clone();
+    changed.feedforward.from_mm = from_mm;
+    changed
+}
+
 fn with_curves(
     settings: &AxisSettings,
     change: impl Fn(StribeckCurve) -> StribeckCurve,
