@@ -53,6 +53,7 @@ const short = (value, digits = 1) => value.toFixed(digits).replace("-", "−");
 function say(text, bad = false) {
   $("message").textContent = text;
   $("message").classList.toggle("bad", bad);
+  if (text && guide.step !== null) guide.report(text, bad);
 }
 
 // Asks, shows a refusal, and returns whether it was done.
@@ -351,12 +352,16 @@ function frame(at) {
 
 async function take(file) {
   if (!file) return;
-  if (tryTo({ load: { text: await file.text(), name: file.name } })) {
-    begin();
-    leaveTour();
-    show();
-    say(`${file.name}: the law runs on it`);
+  let done;
+  try {
+    done = bench.request({ load: { text: await file.text(), name: file.name } });
+  } catch (error) {
+    return say(error.message, true);
   }
+  begin();
+  leaveTour();
+  show();
+  say(done);
 }
 
 function connect() {
@@ -432,5 +437,6 @@ async function openBenchView() {
   connect();
   show();
   goTo(0);
+  guide.begin();
   requestAnimationFrame(frame);
 }

@@ -193,6 +193,8 @@ class MachineView {
       this.alarm("");
       this.say("the board answers again");
     }
+    // The last message may still be that they are on.
+    if (!status.drives && (this.status?.drives || (status.fault !== null && !this.latched))) this.say("the outputs are off");
     this.status = status;
     this.inputs = inputs;
     if (status.at_rest && askedAt > (this.movedAt ?? 0) + 2 * POLL_MS) this.moves = false;

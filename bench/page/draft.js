@@ -137,7 +137,7 @@ class Draft {
       rows.push(row);
     }
     $("m-differences").replaceChildren(...rows);
-    $("m-difference").textContent = rows.length ? `${rows.length} edited and not in force` : "nothing is edited that does not act";
+    $("m-difference").textContent = rows.length ? `${rows.length} edited and not in force` : "the same as the settings in force";
   }
 
   apply() {

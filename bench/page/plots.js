@@ -201,11 +201,12 @@ class PolarPlot {
     context.fillText("90° +y", x, y - outer - 9);
     context.fillText("270°", x, y + outer + 10);
     const diagonal = Math.SQRT1_2;
+    // Outside the outer circle and inside the inner one, where no curve goes.
+    const [outermost, innermost] = [scale, -scale].map((deviation) => radius(deviation) * diagonal);
     context.textAlign = "left";
-    for (const share of [-1, 1]) {
-      const at = radius(share * scale) * diagonal;
-      context.fillText(`${share > 0 ? "+" : "−"}${scale} µm`, x + at + 3, y + at + 5);
-    }
+    context.fillText(`+${scale} µm`, x + outermost + 3, y + outermost + 5);
+    context.textAlign = "right";
+    context.fillText(`−${scale} µm`, x + innermost - 3, y + innermost - 5);
     context.fillStyle = c.soft;
     context.textAlign = "center";
     context.fillText("radius", x, y - 7);

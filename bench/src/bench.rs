@@ -15,6 +15,8 @@ use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant_sim::law_machine::{LawMachine, Operator};
 use quadrant_sim::plant::{AxisParameters, SimulatedStage, virgin_curve_elements};
 use quadrant_sim::settings_file::SettingsFile;
+use quadrant_sim::stage_file::StageFile;
+use quadrant_sim::stage_setup::StageSetup;
 use serde::{Deserialize, Serialize};
 
 use crate::truth::{Ripple, Truth};
@@ -109,6 +111,21 @@ impl BenchMotion {
         Ok(())
     }
 
+    /// Checks that the motion of each axis fits its travel.
+    fn check_travel(self, travel_mm: &[Option<f64>; 3]) -> Result<(), String> {
+        let ways_mm = [2.0, 2.0, 1.0].map(|factor| factor * self.radius_mm);
+        for ((axis, way_mm), travel_mm) in AxisName::ALL.iter().zip(ways_mm).zip(travel_mm) {
+            if let Some(travel_mm) = travel_mm
+                && way_mm > *travel_mm
+            {
+                return Err(format!(
+                    "the motion takes {axis} over {way_mm} mm, and its travel is {travel_mm} mm: choose a smaller radius"
+                ));
+            }
+        }
+        Ok(())
+    }
+
     fn plan(self) -> PlanSettings {
         let feed_mm_s = self.feed_mm_min / 60.0;
         let sense = Sense::CounterClockwise;
@@ -142,6 +159,8 @@ pub struct Bench {
     /// Fields of each axis that were set here.
     set_here: [BTreeSet<String>; 3],
     truth: Truth,
+    /// Travel of each axis, mm; none of the simulated stage's, which has room for every motion.
+    travel_mm: [Option<f64>; 3],
     motion: BenchMotion,
     law: LawMachine<f32, FIRMWARE_ELEMENTS>,
     stage: SimulatedStage,
@@ -165,6 +184,7 @@ impl Default for Bench {
             ripples: truth.ripples(),
             damping_v_s_per_mm: damping(&truth),
             truth,
+            travel_mm: [None; 3],
             motion,
             law: run.law,
             stage: run.stage,
@@ -189,7 +209,8 @@ impl Run {
             stage: settings.clone(),
             plan: motion.plan(),
         })?;
-        let stage = SimulatedStage::new(&truth.stage(), settings.rate_hz, SEED);
+        let mut stage = SimulatedStage::new(&truth.stage(), settings.rate_hz, SEED);
+        stage.set_marks(truth.marks);
         Ok(Self { law, stage })
     }
 }
@@ -274,9 +295,9 @@ impl Bench {
     /// # Errors
     /// As [`Truth::turn`].
     pub fn turn(&mut self, knob: &str, value: f64) -> Result<(), String> {
-        self.truth.turn(knob, value)?;
-        self.ripples = self.truth.ripples();
-        self.damping_v_s_per_mm = damping(&self.truth);
+        let mut truth = self.truth.clone();
+        truth.turn(knob, value)?;
+        self.set_truth(truth);
         let truth = self.truth.stage();
         for (axis, truth) in self.stage.axes_mut().iter_mut().zip(truth.axes) {
             axis.change(truth);
@@ -323,23 +344,76 @@ impl Bench {
     /// A motion outside its ranges or beyond the limits of the settings, in words; the old one goes on then.
     pub fn start(&mut self, motion: BenchMotion) -> Result<(), String> {
         motion.check()?;
+        motion.check_travel(&self.travel_mm)?;
         let run = Run::new(&self.file.stage, &self.truth, motion);
         self.begin(run.map_err(|error| error.to_string())?);
         self.motion = motion;
         Ok(())
     }
 
-    /// Takes the settings of a file, and starts again from rest. `name` is what messages call the file.
+    /// Takes the settings or the stage of a file, and starts again from rest. Returns what it did, in words; `name` is what
+    /// messages call the file.
     ///
     /// # Errors
     /// A file that is refused, in words; nothing has changed then.
-    pub fn load(&mut self, text: &str, name: &str) -> Result<(), String> {
+    pub fn load(&mut self, text: &str, name: &str) -> Result<String, String> {
+        if StageFile::has_axes(text) {
+            self.load_stage(text, name)
+        } else {
+            self.load_settings(text, name)
+        }
+    }
+
+    /// Settings for the stage as it is, which gets the encoders and the converters that they say.
+    fn load_settings(&mut self, text: &str, name: &str) -> Result<String, String> {
         let file = SettingsFile::parse(text, Path::new(name)).map_err(|error| error.to_string())?;
-        let run = Run::new(&file.stage, &self.truth, self.motion);
+        let truth = self.truth.clone().equipped(&file.stage);
+        let run = Run::new(&file.stage, &truth, self.motion);
         self.begin(run.map_err(|error| format!("{name}: {error}"))?);
+        self.set_truth(truth);
         self.file = file;
         self.set_here = Default::default();
-        Ok(())
+        Ok(format!("{name}: the law runs on it"))
+    }
+
+    /// Another stage under the settings as they are, but for the encoders, converters and limits of a stage that has others.
+    fn load_stage(&mut self, text: &str, name: &str) -> Result<String, String> {
+        let stage = StageFile::parse(text, Path::new(name)).map_err(|error| error.to_string())?;
+        let travel_mm = stage.known.map(|known| known.map(|sheet| sheet.span_mm()));
+        self.motion
+            .check_travel(&travel_mm)
+            .map_err(|error| format!("{name}: {error}"))?;
+        let fresh = StageSetup::of(&stage).settings;
+        let mut settings = self.file.stage.clone();
+        let mut set_here = self.set_here.clone();
+        let axes = settings.axes.iter_mut().zip(&fresh.axes);
+        for (axis, (own, fresh)) in axes.enumerate() {
+            let is_same = own.encoder.resolution_mm == fresh.encoder.resolution_mm
+                && own.amplifier.full_scale_v == fresh.amplifier.full_scale_v;
+            if stage.known[axis].is_some() && !is_same {
+                own.encoder = fresh.encoder;
+                own.amplifier = fresh.amplifier;
+                own.limits = fresh.limits;
+                set_here[axis].extend(["encoder", "amplifier", "limits"].map(str::to_owned));
+            }
+        }
+        let truth = Truth::new(stage.truth, stage.marks).equipped(&settings);
+        let run = Run::new(&settings, &truth, self.motion);
+        self.begin(run.map_err(|error| format!("{name}: {error}"))?);
+        self.set_truth(truth);
+        self.travel_mm = travel_mm;
+        self.file.stage = settings;
+        self.set_here = set_here;
+        Ok(format!(
+            "{name}: the stage is yours, the law is still tuned for another; now open the settings that quadrant compare --stage \
+             {name} writes"
+        ))
+    }
+
+    fn set_truth(&mut self, truth: Truth) {
+        self.truth = truth;
+        self.ripples = self.truth.ripples();
+        self.damping_v_s_per_mm = damping(&self.truth);
     }
 
     /// Returns the settings as a file, with their origin.
@@ -566,6 +640,23 @@ mod tests {
     }
 
     #[test]
+    fn settings_of_another_encoder_run_on_a_stage_that_has_it() {
+        let mut bench = Bench::default();
+        let text = bench.save().unwrap();
+        let finer = text
+            .replace("resolution_mm = 0.0005", "resolution_mm = 0.0001")
+            .replace("counts_per_index = 20000", "counts_per_index = 100000");
+        assert_ne!(finer, text);
+        bench.load(&finer, "finer.toml").unwrap();
+        assert_eq!(bench.truth().stage().axes[0].resolution_mm, 1e-4);
+        samples(&mut bench, 2.0);
+        let whole = samples(&mut bench, 4.5);
+        assert_eq!(bench.fault(), None);
+        assert!(largest(&whole, 3) > 15.0);
+        assert!(largest(&whole, 4) < 6.0, "{} um", largest(&whole, 4));
+    }
+
+    #[test]
     fn a_motion_beyond_the_limits_is_refused_and_the_old_one_goes_on() {
         let mut bench = Bench::default();
         let tight = BenchMotion {
@@ -582,6 +673,48 @@ mod tests {
         assert!(bench.start(BenchMotion::default()).is_err());
         assert_eq!(bench.motion(), BenchMotion::default());
         assert!(largest(&samples(&mut bench, 2.0), 3) > 1.0);
+    }
+
+    #[test]
+    fn a_stage_of_a_file_moves_as_its_numbers_say_and_a_refused_one_changes_nothing() {
+        let mut bench = Bench::default();
+        let text = include_str!("../../examples/stage.toml");
+        let said = bench.load(text, "stage.toml").unwrap();
+        assert!(
+            said.contains("quadrant compare --stage stage.toml"),
+            "{said}"
+        );
+        let [x, y, _] = bench.truth().stage().axes;
+        // 400 N on 40 kg for a volt; the table's encoder counts 0.1 um.
+        assert!((x.gain_mm_per_v_s2 - 1e4).abs() < 1e-6);
+        assert_eq!(x.resolution_mm, 1e-4);
+        assert_eq!(bench.settings().axes[0].encoder.resolution_mm, 1e-4);
+        assert_eq!(y, Bench::default().truth().stage().axes[1]);
+        // The law is tuned for another stage: it runs, and badly.
+        samples(&mut bench, 2.0);
+        assert!(largest(&samples(&mut bench, 4.5), 4) > 50.0);
+        assert_eq!(bench.fault(), None);
+
+        let before = (bench.truth().clone(), bench.settings().clone());
+        for (text, reason) in [
+            (
+                "[x]\nmass_kg = -1\n",
+                "mine.toml: x.mass_kg = -1 is outside 0.01 to 100000",
+            ),
+            ("[x]\nmas_kg = 1\n", "unknown field `mas_kg`"),
+            (
+                "[y]\ntravel_mm = [-5, 5]\n",
+                "its travel is 10 mm: choose a smaller radius",
+            ),
+            (
+                "[z]\nmax_velocity_mm_s = 1\nresolution_um = 1\n",
+                "mine.toml: ",
+            ),
+        ] {
+            let error = bench.load(text, "mine.toml").unwrap_err();
+            assert!(error.contains(reason), "{error}");
+            assert_eq!((bench.truth(), bench.settings()), (&before.0, &before.1));
+        }
     }
 
     #[test]

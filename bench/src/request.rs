@@ -8,6 +8,9 @@ use crate::controls::Controls;
 use crate::loop_response::LoopResponse;
 use crate::truth::KNOBS;
 
+/// The repository's example of a stage.
+const EXAMPLE: &str = include_str!("../../examples/stage.toml");
+
 /// A request: its name, or an object of its name and an object of its fields.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
@@ -51,13 +54,15 @@ pub enum Request {
     Restart,
     /// Puts law, stage and motion as they were when the page was opened.
     Reset,
-    /// Takes the settings of a file.
+    /// Takes the settings or the stage of a file; the reply says in words what it did.
     Load {
         /// The file's text.
         text: String,
         /// The file's name.
         name: String,
     },
+    /// The text of the example of a stage's file.
+    Example,
     /// The settings as a file's text.
     Save,
     /// The open loop of an axis, 0 to 2.
@@ -111,6 +116,8 @@ fn act(bench: &mut Bench, request: Request) -> Result<Value, String> {
             let found = LoopResponse::of(bench.settings(), &bench.truth().stage(), known(axis)?);
             return serde_json::to_value(found).map_err(|error| error.to_string());
         }
+        Request::Load { text, name } => return Ok(Value::String(bench.load(&text, &name)?)),
+        Request::Example => return Ok(Value::String(EXAMPLE.to_owned())),
         Request::Save => return Ok(Value::String(bench.save()?)),
         Request::Set { path, value } => bench.set(&path, &value.to_string())?,
         Request::Choose { law, feedforward } => bench.choose(&law, &feedforward)?,
@@ -119,7 +126,6 @@ fn act(bench: &mut Bench, request: Request) -> Result<Value, String> {
         Request::Start { motion } => bench.start(motion)?,
         Request::Restart => bench.restart(),
         Request::Reset => *bench = Bench::default(),
-        Request::Load { text, name } => bench.load(&text, &name)?,
     }
     Ok(Value::Null)
 }
@@ -155,6 +161,20 @@ mod tests {
                 assert_eq!(shown["ok"]["controls"]["law"], law["name"]);
             }
         }
+    }
+
+    #[test]
+    fn the_example_of_a_stage_can_be_loaded_as_it_is() {
+        let mut bench = Bench::default();
+        let example = ask(&mut bench, &json!("example"));
+        let load = json!({"load": {"text": example["ok"], "name": "stage.toml"}});
+        let said = ask(&mut bench, &load);
+        assert!(
+            said["ok"]
+                .as_str()
+                .unwrap()
+                .starts_with("stage.toml: the stage is yours")
+        );
     }
 
     #[test]

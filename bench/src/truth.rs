@@ -1,11 +1,13 @@
-//! The stage's own parameters, which the law does not know: the simulated stage's, each with a knob.
+//! The stage's own parameters, which the law does not know: the simulated stage's or those of a file, with knobs.
 //!
 //! They are the same to the bit on every platform: what the plant would compute by the platform's functions is rounded, or
 //! computed here by `libm`.
 
 use std::f64::consts::TAU;
 
-use quadrant_sim::plant::{AxisParameters, StageParameters};
+use quadrant_settings::StageSettings;
+use quadrant_sim::plant::{AxisParameters, MarkParameters, StageParameters};
+use quadrant_sim::stage_setup::StageSetup;
 use serde::Serialize;
 
 /// A knob of the stage, which turns all axes alike.
@@ -21,7 +23,7 @@ pub struct Knob {
     pub least: f64,
     /// Largest value.
     pub most: f64,
-    /// Value of the simulated stage.
+    /// Value at rest.
     pub default: f64,
     /// Meaning, in one sentence.
     pub meaning: &'static str,
@@ -122,20 +124,46 @@ fn with_presliding(mut axis: AxisParameters, factor: f64) -> AxisParameters {
     axis
 }
 
-/// The position of every knob.
+/// A stage, and the position of every knob.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Truth([f64; KNOBS.len()]);
+pub struct Truth {
+    /// The stage while all knobs are at rest.
+    at_rest: StageParameters,
+    /// Switches and index pulses.
+    pub marks: [MarkParameters; 3],
+    knobs: [f64; KNOBS.len()],
+}
 
 impl Default for Truth {
     fn default() -> Self {
-        Self(KNOBS.map(|knob| knob.default))
+        Self::new(StageParameters::real(), Default::default())
     }
 }
 
 impl Truth {
+    /// A stage with all knobs at rest.
+    pub fn new(at_rest: StageParameters, marks: [MarkParameters; 3]) -> Self {
+        Self {
+            at_rest,
+            marks,
+            knobs: KNOBS.map(|knob| knob.default),
+        }
+    }
+
+    /// The same stage with the encoders and the converters that settings say.
+    #[must_use]
+    pub fn equipped(self, settings: &StageSettings) -> Self {
+        let setup = StageSetup::fresh(self.at_rest, self.marks).started_with(settings);
+        Self {
+            at_rest: setup.truth,
+            marks: setup.marks,
+            knobs: self.knobs,
+        }
+    }
+
     /// The knobs' values, in their order.
     pub fn values(&self) -> &[f64] {
-        &self.0
+        &self.knobs
     }
 
     /// Turns a knob.
@@ -149,11 +177,11 @@ impl Truth {
         if !(least..=most).contains(&value) {
             return Err(format!("{name} = {value} is outside {least} to {most}"));
         }
-        self.0[index] = value;
+        self.knobs[index] = value;
         Ok(())
     }
 
-    /// The simulated stage with the knobs where they are, but for the ripples of its screws.
+    /// The stage with the knobs where they are, but for the ripples of its screws.
     pub fn stage(&self) -> StageParameters {
         let mut axes = self.whole();
         for axis in &mut axes {
@@ -175,8 +203,8 @@ impl Truth {
     }
 
     fn whole(&self) -> [AxisParameters; 3] {
-        StageParameters::real().axes.map(|axis| {
-            let knobs = KNOBS.iter().zip(self.0);
+        self.at_rest.axes.clone().map(|axis| {
+            let knobs = KNOBS.iter().zip(self.knobs);
             knobs.fold(axis, |axis, (knob, value)| (knob.turn)(axis, value))
         })
     }

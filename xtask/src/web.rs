@@ -17,10 +17,11 @@ const FETCHED: &str = "target/web/npm";
 /// Its sources.
 const SOURCES: &str = "bench/page";
 /// Its scripts, in the order in which they name each other.
-const SCRIPTS: [&str; 9] = [
+const SCRIPTS: [&str; 10] = [
     "machine.js",
     "tour.js",
     "plots.js",
+    "guide.js",
     "bench.js",
     "link.js",
     "strips.js",

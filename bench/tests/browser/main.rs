@@ -2,6 +2,7 @@
 //!
 //! `cargo xtask web --check` builds the page and runs these tests, as `cargo xtask test` does.
 
+mod guide;
 mod serial;
 
 use std::path::PathBuf;

@@ -367,6 +367,8 @@ fn an_input_and_its_fault_are_shown_with_the_remedy_and_reset() {
     assert!(wired.text("m-events").contains("fault"));
     wired.wait_for("machineView.status?.state === 'fault'");
     assert!(!wired.machine.outputs().enabled);
+    // Not "outputs on", which Enable had said.
+    wired.wait_for("document.getElementById('m-message').textContent === 'the outputs are off'");
 
     // Not while it is pressed.
     wired.click("#m-reset");

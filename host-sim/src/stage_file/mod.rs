@@ -143,6 +143,20 @@ impl StageFile {
         Self::parse(&text, path)
     }
 
+    /// True if a text has a line that begins the table of an axis, as no other file of the project has.
+    pub fn has_axes(text: &str) -> bool {
+        let begins_axis = |line: &str| {
+            let name = line.trim_start().strip_prefix('[');
+            let name = name.and_then(|rest| rest.split(']').next());
+            name.is_some_and(|name| {
+                AxisName::ALL
+                    .iter()
+                    .any(|axis| axis.as_str() == name.trim())
+            })
+        };
+        text.lines().any(begins_axis)
+    }
+
     /// Checks a file's text; `path` is what messages call it.
     ///
     /// # Errors
@@ -475,6 +489,24 @@ mod tests {
 
     fn refused(text: &str) -> String {
         parse(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_stage_is_known_by_the_tables_of_its_axes() {
+        for text in [
+            include_str!("../../../examples/stage.toml"),
+            "# mine\n[ y ] # slide\nmass_kg = 1\n",
+            "\t[z]",
+        ] {
+            assert!(StageFile::has_axes(text), "{text}");
+        }
+        for text in [
+            include_str!("../../data/identified-stage.toml"),
+            "# [x]\nform = 1\n[[stage.axes]]\n[xy]\n[",
+            "",
+        ] {
+            assert!(!StageFile::has_axes(text), "{text}");
+        }
     }
 
     #[test]

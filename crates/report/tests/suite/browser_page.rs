@@ -119,11 +119,8 @@ fn a_label_at_the_end_of_an_axis_is_not_cut() {
     }
 }
 
-#[test]
-fn a_table_of_thirteen_columns_does_not_scroll_on_a_screen_of_1100_pixels() {
-    let Some(mut opened) = Opened::new() else {
-        return;
-    };
+/// A page with a table of thirteen columns.
+fn thirteen_columns() -> String {
     let mut wide = table("wide");
     wide.columns = ["Plane", "Radius", "Feed", "Configuration"]
         .map(Column::new)
@@ -141,10 +138,43 @@ fn a_table_of_thirteen_columns_does_not_scroll_on_a_screen_of_1100_pixels() {
     ];
     row.extend((0..9).map(|_| Cell::number(-168.99, 2)));
     wide.rows = vec![row];
-    let path = opened.write(&page(vec![Block::Table(wide)]).to_html().unwrap());
+    page(vec![Block::Table(wide)]).to_html().unwrap()
+}
+
+#[test]
+fn a_table_of_thirteen_columns_does_not_scroll_on_a_screen_of_1100_pixels() {
+    let Some(mut opened) = Opened::new() else {
+        return;
+    };
+    let path = opened.write(&thirteen_columns());
     opened.browser.open(&path, (1100, 900), false);
     let hidden = "(() => { const t = document.querySelector('.scroll'); return t.scrollWidth - t.clientWidth; })()";
     assert_eq!(opened.browser.evaluate(hidden), json!(0));
+}
+
+#[test]
+fn a_table_shows_a_shadow_where_columns_are_out_of_sight_and_only_there() {
+    let Some(mut opened) = Opened::new() else {
+        return;
+    };
+    let path = opened.write(&thirteen_columns());
+    opened.browser.open(&path, (390, 900), false);
+    // The picture of a spot at the right edge of the table's head, above the names that take one line.
+    let mut strip = |scrolled: &str| {
+        let place = opened.browser.evaluate(&format!(
+            "(() => {{ const table = document.querySelector('.scroll'); table.scrollLeft = {scrolled}; \
+             table.scrollIntoView({{ block: 'center', behavior: 'instant' }}); const box = table.getBoundingClientRect(); \
+             return [box.right - 4, box.top + 6]; }})()"
+        ));
+        let clip = json!({"x": place[0], "y": place[1], "width": 3, "height": 3, "scale": 1});
+        let taken = opened.browser.call(
+            "Page.captureScreenshot",
+            json!({"format": "png", "clip": clip}),
+        );
+        taken["data"].as_str().unwrap().to_owned()
+    };
+    let [start, end] = ["0", "1e4"].map(&mut strip);
+    assert_ne!(start, end);
 }
 
 #[test]
