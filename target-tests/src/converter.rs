@@ -16,9 +16,11 @@ use xtask::prove::ROOT;
 use xtask::toolchain::Toolchain;
 
 /// Functions that are the converter's: at the beginning of a tick, and when it has computed its outputs.
-pub(crate) const BEGIN: &str = "<quadrant_firmware::board::nucleo_f446re::amplifiers::Amplifiers as quadrant::hal::Amplifiers>::begin";
+pub(crate) const BEGIN: &str =
+    "<quadrant_firmware::board::stm32::amplifiers::Amplifiers as quadrant::hal::Amplifiers>::begin";
 /// See [`BEGIN`].
-pub(crate) const WRITE: &str = "<quadrant_firmware::board::nucleo_f446re::amplifiers::Amplifiers as quadrant::hal::Amplifiers>::write";
+pub(crate) const WRITE: &str =
+    "<quadrant_firmware::board::stm32::amplifiers::Amplifiers as quadrant::hal::Amplifiers>::write";
 /// The register that starts the timer.
 const START: &str = "stm32f446::tim1::cr1::";
 /// The function that waits, by the end of its name.
