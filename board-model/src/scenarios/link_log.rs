@@ -1,11 +1,9 @@
 //! The log over the link.
 
-use std::path::Path;
-
 use anyhow::{Result, anyhow};
 use quadrant_link::message::{Body, LogPage, Reply};
 
-use crate::bench::Bench;
+use crate::bench::{Bench, Subject};
 use crate::link::Client;
 use crate::report::Report;
 use crate::scenarios::{commissioned, enable, started};
@@ -13,7 +11,7 @@ use crate::scenarios::{commissioned, enable, started};
 /// Bytes that the server keeps (docs/log.md).
 const KEPT: u32 = 2048;
 
-pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
     let mut bench = started(image, Some(&commissioned(image)?))?;
     bench.with(|world, _, _| world.log.is_read = false);
     bench.run_for(0.02);

@@ -50,8 +50,8 @@ pub(crate) const SPI_STREAM: u32 = 0;
 /// to/from USART").
 pub(crate) const UART_STREAM: u32 = 1 << 20;
 /// Largest number of polls of what was started before giving up: the longest takes some 5800 cycles, a look, which crosses two
-/// bridges twice, at least 20.
-pub(crate) const PATIENCE: u32 = 300;
+/// bridges, at least 10.
+pub(crate) const PATIENCE: u32 = 600;
 
 /// The timers of the encoders. Those of 32 bits have no two inputs that Ethernet's chip or the trace port leave alone.
 pub(crate) type X = pac::TIM1;
