@@ -114,7 +114,7 @@ macro_rules! fit {
             let select = $family::peripherals::spi::Select {
                 port: $wiring.converter_port,
                 pin: pin_of(pin),
-                active: Level::Low,
+                active: wire.active(),
             };
             $chip.spi[spi].attach_selected(End::new(wire, $converter), select);
         }
