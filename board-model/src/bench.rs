@@ -282,9 +282,7 @@ impl Driver<Nucleo> for World {
                 }
                 self.ticks.acknowledge(now.0, access.instruction_count);
             }
-            address
-                if address == self.wiring.watchdog_key && access.value & 0xFFFF == 0xAAAA =>
-            {
+            address if address == self.wiring.watchdog_key && access.value & 0xFFFF == 0xAAAA => {
                 if self.feeds.0 != 0 {
                     self.feeds.1 = self.feeds.1.max(now.0 - self.feeds.0);
                 }
@@ -586,8 +584,12 @@ fn run(
     let mut images = vec![Image::read(&image.image, None).map_err(|e| text(&e))?];
     if let Some(bytes) = settings {
         images.push(
-            Image::new(Path::new("settings.bin"), bytes, Some(image.board.settings.0))
-                .map_err(|e| text(&e))?,
+            Image::new(
+                Path::new("settings.bin"),
+                bytes,
+                Some(image.board.settings.0),
+            )
+            .map_err(|e| text(&e))?,
         );
     }
     let board = Nucleo::new(image.board, chip, line, hse_hz).map_err(|e| text(&e))?;

@@ -202,12 +202,8 @@ impl Nucleo {
         self.drive(now, at, high);
         let pin = pin_of(at.1);
         let function = match &mut self.chip {
-            Chip::F4(chip) => {
-                stm32f427::peripherals::gpio::Gpio::function(pin, chip.port(at.0).1)
-            }
-            Chip::H7(chip) => {
-                stm32h743::peripherals::gpio::Gpio::function(pin, chip.port(at.0).1)
-            }
+            Chip::F4(chip) => stm32f427::peripherals::gpio::Gpio::function(pin, chip.port(at.0).1),
+            Chip::H7(chip) => stm32h743::peripherals::gpio::Gpio::function(pin, chip.port(at.0).1),
         };
         if function != Some(encoder.function) {
             return;
@@ -350,8 +346,14 @@ impl Board for Nucleo {
 
     fn targets(&mut self) -> Vec<Target<'_>> {
         let (variant, lines) = match &self.chip {
-            Chip::F4(chip) => (armv7m::Variant::M4, Operate::cpu(chip.as_ref()).interrupt_lines),
-            Chip::H7(chip) => (armv7m::Variant::M7, Operate::cpu(chip.as_ref()).interrupt_lines),
+            Chip::F4(chip) => (
+                armv7m::Variant::M4,
+                Operate::cpu(chip.as_ref()).interrupt_lines,
+            ),
+            Chip::H7(chip) => (
+                armv7m::Variant::M7,
+                Operate::cpu(chip.as_ref()).interrupt_lines,
+            ),
         };
         let core = armv7m::Core {
             variant,
@@ -366,11 +368,8 @@ impl Board for Nucleo {
         match &mut self.chip {
             Chip::F4(chip) => {
                 let windows = rigless::cpu::armv7m::windows(Mcu::bus(chip.as_ref()));
-                let spec = core.spec_with_parts(
-                    &windows,
-                    armv7m::Fpu::FpV4Sp,
-                    armv7m::MpuRegions::Eight,
-                );
+                let spec =
+                    core.spec_with_parts(&windows, armv7m::Fpu::FpV4Sp, armv7m::MpuRegions::Eight);
                 vec![Target::new("stm32", chip.as_mut(), spec)]
             }
             Chip::H7(chip) => {

@@ -104,6 +104,8 @@ pub struct Wiring {
     pub low_mv: u32,
     /// The watchdog's time after its last feed, s.
     pub watchdog_s: [f64; 2],
+    /// Highest control rate, Hz.
+    pub fastest_hz: f64,
     /// Longest start, s.
     pub start_s: f64,
     /// Complaints of the chip model that are about the model, by a part of their text.
@@ -172,6 +174,7 @@ pub static NUCLEO_F446RE: Wiring = Wiring {
     read_within_ns: 7_000,
     low_mv: 2840,
     watchdog_s: [6.8e-3, 18.8e-3],
+    fastest_hz: 15_000.0,
     start_s: 2.0,
     known: &[],
 };
@@ -181,8 +184,8 @@ pub static NUCLEO_H743ZI2: Wiring = Wiring {
     name: "nucleo-h743zi2",
     family: Family::H7,
     core_hz: 480_000_000,
-    // 2.4 cycles each.
-    instructions_per_s: 200_000_000,
+    // 4.8 cycles each, which is more than this core takes: a model of twice as many is twice as slow.
+    instructions_per_s: 100_000_000,
     clocks_mhz: "480/240/120/120/240/240",
     enable: At(2, 9),
     emergency_stop: At(3, 0),
@@ -235,6 +238,7 @@ pub static NUCLEO_H743ZI2: Wiring = Wiring {
     read_within_ns: 7_500,
     low_mv: 2700,
     watchdog_s: [9.5e-3, 10.9e-3],
+    fastest_hz: 20_000.0,
     start_s: 2.0,
     // The model ends at scale 1, 400 MHz (rigless, pwr.rs, "Voltage scale 0 and SYSCFG_PWRCR.ODEN").
     known: &["for the voltage scale in use"],

@@ -8,9 +8,7 @@ use rigless::soc::Width;
 use crate::bench::{Bench, Subject};
 use crate::link::Client;
 use crate::report::Report;
-use crate::scenarios::{
-    NEXT_TICK_S, clear, jogging, row_fault, row_off, row_started, runs,
-};
+use crate::scenarios::{NEXT_TICK_S, clear, jogging, row_fault, row_off, row_started, runs};
 
 /// TIM7_SR, which every control tick writes.
 const TICK_STATUS: u64 = 0x4000_1410;

@@ -3,6 +3,7 @@
 mod clock;
 mod converter;
 mod encoders;
+mod fastest;
 mod faults;
 mod flood;
 mod inputs;
@@ -57,6 +58,7 @@ pub const SCENARIOS: &[Scenario] = scenarios! {
     "flood", "noise and requests without a pause on the link", flood::run;
     "link-log", "the log over the link, while no probe reads it", link_log::run;
     "clock", "8 MHz missing at the start, and lost in motion", clock::run;
+    "fastest", "a jog at the highest control rate that the board is up to", fastest::run;
     "words", "every converter word of 10 s of motion beside the reference model's", words::run;
 };
 
