@@ -92,7 +92,7 @@ pub struct Wiring {
     pub settings: (u64, u64),
     /// The flash's control register: address, bit that starts an erasure, place of the sector's number, number of the first sector.
     pub flash_control: (u64, u64, u32, u64),
-    /// Where the stack, which is at the bottom of RAM, would grow to.
+    /// Addresses below the stack, which is at the bottom of RAM.
     pub below_stack: Range<u64>,
     /// Pulses of an encoder's line that do not pass its filter, and that do, ns.
     pub filtered_ns: [u64; 2],
@@ -104,6 +104,8 @@ pub struct Wiring {
     pub low_mv: u32,
     /// The watchdog's time after its last feed, s.
     pub watchdog_s: [f64; 2],
+    /// True if the control ticks go on in time for the watchdog when the chip has fallen back to its own clock.
+    pub own_clock_feeds: bool,
     /// Highest control rate, Hz.
     pub fastest_hz: f64,
     /// Longest start, s.
@@ -174,6 +176,7 @@ pub static NUCLEO_F446RE: Wiring = Wiring {
     read_within_ns: 7_000,
     low_mv: 2840,
     watchdog_s: [6.8e-3, 18.8e-3],
+    own_clock_feeds: false,
     fastest_hz: 15_000.0,
     start_s: 2.0,
     known: &[],
@@ -238,6 +241,8 @@ pub static NUCLEO_H743ZI2: Wiring = Wiring {
     read_within_ns: 7_500,
     low_mv: 2700,
     watchdog_s: [9.5e-3, 10.9e-3],
+    // 64 MHz instead of 480: a tick lasts 0.75 ms, and the watchdog is fed every tenth.
+    own_clock_feeds: true,
     fastest_hz: 20_000.0,
     start_s: 2.0,
     // The model ends at scale 1, 400 MHz (rigless, pwr.rs, "Voltage scale 0 and SYSCFG_PWRCR.ODEN").

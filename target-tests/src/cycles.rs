@@ -228,7 +228,7 @@ impl Code {
     }
 
     /// Cycles along a path, without wait states.
-    fn along(&self, path: &[u32]) -> u32 {
+    pub(crate) fn along(&self, path: &[u32]) -> u32 {
         let pairs = whole(path);
         pairs
             .windows(2)

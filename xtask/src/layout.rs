@@ -120,7 +120,7 @@ fn settings_are_left_alone(image: &Image, settings: &Range<u64>) -> Result<()> {
     Ok(())
 }
 
-/// What DMA streams read and write lies in SRAM 1 of the STM32H743: they reach no tightly coupled memory.
+/// The memory of DMA streams lies in SRAM 1 of the STM32H743: they reach no tightly coupled memory.
 fn streams_reach_their_memory(image: &Image) -> Result<()> {
     const SRAM_1: Range<u64> = 0x3000_0000..0x3002_0000;
     let (start, end) = (image.symbol("_dma_start")?, image.symbol("_dma_end")?);

@@ -54,13 +54,18 @@ pub(super) fn erase(image: &Subject, report: &mut Report) -> Result<()> {
     trace_flash(&mut bench);
     let before = client.status(&mut bench)?;
     let mut erased = false;
-    for number in 1..8 {
+    let most = stores(image);
+    for number in 1..=most {
         if store_until_erasure(&mut bench, &mut client, &format!("set {number}"))?.is_some() {
             erased = true;
             break;
         }
     }
-    report.equal("a sector is erased by one of seven stores", true, erased);
+    report.equal(
+        &format!("a sector is erased by one of {most} stores"),
+        true,
+        erased,
+    );
     bench.with(|world, _, _| world.feeds.1 = 0);
     bench.spin(TURNED);
     let answered = bench.run_while(STORE_S, 0.001, |bench| client.take(bench).is_some());
@@ -115,7 +120,8 @@ pub(super) fn power_cut(image: &Subject, report: &mut Report) -> Result<()> {
     trace_flash(&mut bench);
     let mut origin = String::from("board-run");
     let mut erased = None;
-    for number in 1..8 {
+    let most = stores(image);
+    for number in 1..=most {
         let next = format!("set {number}");
         let sector = store_until_erasure(&mut bench, &mut client, &next)?;
         if let Some(sector) = sector {
@@ -127,7 +133,7 @@ pub(super) fn power_cut(image: &Subject, report: &mut Report) -> Result<()> {
     let Some(sector) = erased else {
         report.row(
             "stores until a sector is erased",
-            "at most 7",
+            format!("at most {most}"),
             "none",
             false,
         );
@@ -171,6 +177,11 @@ pub(super) fn power_cut(image: &Subject, report: &mut Report) -> Result<()> {
         );
     }
     Ok(())
+}
+
+/// Stores by which a sector is full: a set takes more than 2 KiB.
+fn stores(image: &Subject) -> u64 {
+    image.board.settings.1 / 2048 - 1
 }
 
 /// Keeps what is written to the flash's control register.

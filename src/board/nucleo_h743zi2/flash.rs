@@ -1,7 +1,7 @@
 //! Flash for stored settings: the last two sectors of bank 2, 128 KiB each.
 //!
-//! The image runs from bank 1, so the processor goes on while bank 2 erases or programs (RM0433, 4.3.11): **only while the
-//! amplifiers are disabled** all the same, as on other boards. It is written by flash words of 32 bytes with a checksum each (ECC,
+//! The image runs from bank 1, so the processor goes on while bank 2 erases or programs (RM0433, 4.3.11); neither begins while the
+//! amplifiers are enabled all the same, as on other boards. It is written by flash words of 32 bytes with a checksum each (ECC,
 //! 4.3.12), every one once after an erasure. One that a power cut left half written may have two wrong bits or more: reading it is a bus
 //! error (4.7.7 to 4.7.9), which is met here, and reads as zeros, which is neither blank nor any item.
 

@@ -7,7 +7,7 @@ use core::ptr::write_volatile;
 
 use cortex_m::Peripherals;
 
-/// MPU_RASR (Armv7-M, B3.5.9): enabled; size 2^(n+1) bytes (SIZE); accesses (AP); no execution (XN).
+/// MPU_RASR (Armv7-M, B3.5.9): enabled; size 2^(n+1) bytes (SIZE); eighths left out (SRD); accesses (AP); no execution (XN).
 const ENABLED: u32 = 1;
 const NO_EXECUTION: u32 = 1 << 28;
 const FULL_ACCESS: u32 = 0b011 << 24;
@@ -20,11 +20,19 @@ const DEVICE: u32 = 1 << 18 | 1 << 16;
 const KIB_64: u32 = 15 << 1;
 const KIB_128: u32 = 16 << 1;
 const KIB_256: u32 = 17 << 1;
+const ALL: u32 = 31 << 1;
+/// All eighths but those of external memories, 0x60000000 to 0xDFFFFFFF.
+const BUT_EXTERNAL: u32 = 0b1000_0111 << 8;
 /// MPU_CTRL (B3.5.5): the default map elsewhere (PRIVDEFENA), on.
 const ON: u32 = 1 << 2 | 1;
 
-/// First address and attributes.
-const REGIONS: [(u32, u32); 3] = [
+/// First address and attributes; a later one goes before an earlier one.
+const REGIONS: [(u32, u32); 4] = [
+    // External memories, of which there are none: the core may read ahead there, and wait for ever (AN4838).
+    (
+        0,
+        DEVICE | NO_ACCESS | NO_EXECUTION | BUT_EXTERNAL | ALL | ENABLED,
+    ),
     // SRAM 1, `.dma` of the linker's map.
     (
         0x3000_0000,
