@@ -19,6 +19,11 @@ fn main() {
         install(board, "roles.x", &out);
         link_argument("-Troles.x");
         board
+    } else if env::var_os("CARGO_FEATURE_BOARD_NUCLEO_H743ZI2").is_some() {
+        let board = Path::new("src/board/nucleo_h743zi2");
+        install(board, "roles.x", &out);
+        link_argument("-Troles.x");
+        board
     } else {
         return;
     };

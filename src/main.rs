@@ -13,33 +13,18 @@
 // Registers are the only reason for `unsafe`, and `board` is their only place.
 #![deny(unsafe_code)]
 
-#[cfg(all(
-    target_os = "none",
-    any(feature = "board-mps2", feature = "board-nucleo-f446re")
-))]
+#[cfg(all(target_os = "none", feature = "firmware"))]
 #[allow(unsafe_code)]
 mod board;
-#[cfg(all(
-    target_os = "none",
-    any(feature = "board-mps2", feature = "board-nucleo-f446re")
-))]
+#[cfg(all(target_os = "none", feature = "firmware"))]
 mod boot;
-#[cfg(all(
-    target_os = "none",
-    any(feature = "board-mps2", feature = "board-nucleo-f446re")
-))]
+#[cfg(all(target_os = "none", feature = "firmware"))]
 mod log;
 
-#[cfg(all(
-    target_os = "none",
-    not(any(feature = "board-mps2", feature = "board-nucleo-f446re"))
-))]
-compile_error!("choose a board: `board-mps2` or `board-nucleo-f446re` (`cargo xtask build` does)");
+#[cfg(all(target_os = "none", not(feature = "firmware")))]
+compile_error!("choose a board, `board-nucleo-f446re` or another (`cargo xtask build` does)");
 
-#[cfg(all(
-    target_os = "none",
-    any(feature = "board-mps2", feature = "board-nucleo-f446re")
-))]
+#[cfg(all(target_os = "none", feature = "firmware"))]
 #[rtic::app(
     device = crate::board::device,
     peripherals = false,

@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 use rigless::chip::Timeline;
 use rigless::chip::spi::Peer;
+use rigless::device::Level;
 use rigless::snapshot::{Error, Reader, Store, Writer};
 
 /// `SCLK` cycle time, ns (t1).
@@ -383,7 +384,17 @@ pub enum Wire {
     Clr,
 }
 
-/// The converter's end of a wire. All are attached as chips of a serial bus, selected while the wire is low: so rigless
+impl Wire {
+    /// The level that the wire does not have at first: a chip whose pins float out of reset does not report the one that it has.
+    pub const fn active(self) -> Level {
+        match self {
+            Self::Bus | Self::Ldac => Level::Low,
+            Self::Clr => Level::High,
+        }
+    }
+}
+
+/// The converter's end of a wire. All are attached as chips of a serial bus, selected at [`Wire::active`]: so rigless
 /// reports a pin's edges.
 #[derive(Debug)]
 pub struct End {
@@ -426,10 +437,10 @@ impl Peer for End {
     }
 
     fn select(&mut self, context: &mut Timeline<'_, '_>) {
-        self.edge(false, context.now().0);
+        self.edge(self.wire.active() == Level::High, context.now().0);
     }
 
     fn deselect(&mut self, context: &mut Timeline<'_, '_>) {
-        self.edge(true, context.now().0);
+        self.edge(self.wire.active() == Level::Low, context.now().0);
     }
 }

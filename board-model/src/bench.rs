@@ -4,7 +4,7 @@
 //! looks and acts the model waits, and [`Bench::run_for`] lets it go on.
 
 use std::collections::VecDeque;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
@@ -13,29 +13,30 @@ use rigless::emulator::{self, AccessKind, Driver, Host, Settled, Start, Stop};
 use rigless::image::Image;
 use rigless::session::Session;
 use rigless::soc::Width;
-use rigless::soc::stm32f427::peripherals::rcc::Apb;
 use rigless::symbols::Symbols;
 use rigless::time::VirtualNanos;
 
 use crate::ad5754r::{self, Shared};
-use crate::board::{At, COUNTER, ENABLE, HSE_HZ, Nucleo, SharedLine, TIMERS};
+use crate::board::{COUNTER, HSE_HZ, Nucleo, SharedLine};
 use crate::log::Log;
 use crate::stage::{Axis, INDEX_COUNTS, STEP_NS};
+use crate::wiring::{At, Wiring};
 
-/// First address of the two sectors of settings.
-pub const SETTINGS: u64 = 0x0800_4000;
-/// Size of the two sectors of settings.
-pub const SETTINGS_BYTES: u64 = 0x8000;
 /// TIM7_SR: the control tick acknowledges its interrupt there.
 const TICK_STATUS: u64 = 0x4000_1410;
 /// TIM7_CNT: the control tick looks at its time there.
 const TICK_COUNTER: u64 = 0x4000_1424;
-/// IWDG_KR.
-const WATCHDOG_KEY: u64 = 0x4000_3000;
-/// Port registers.
-const PORTS: std::ops::Range<u64> = 0x4002_0000..0x4002_0C00;
 /// Time between two looks at the log, ns.
 const LOG_NS: u64 = 1_000_000;
+
+/// An image, and the board that it is for.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// Path of the image.
+    pub image: PathBuf,
+    /// The board.
+    pub board: &'static Wiring,
+}
 
 /// Request of the scenario to the model's thread.
 enum Order {
@@ -106,6 +107,7 @@ pub struct TickRecord {
 /// Everything around the chip, on the model's side.
 #[derive(Debug)]
 pub struct World {
+    wiring: &'static Wiring,
     orders: Receiver<Order>,
     target: Option<(u64, SyncSender<()>)>,
     /// True if the axes move as their amplifiers' voltages say; else by `spin`.
@@ -180,8 +182,8 @@ impl World {
 
     fn note_count(&mut self, axis: usize, read: u32) {
         let last = &mut self.counts[axis];
-        *last = match axis {
-            0 => read,
+        *last = match self.wiring.encoders[axis].mask {
+            u32::MAX => read,
             _ => last.wrapping_add_signed(
                 (read as u16)
                     .wrapping_sub(*last as u16)
@@ -192,7 +194,7 @@ impl World {
     }
 
     fn plan_edges(&mut self, board: &mut Nucleo, now: u64) {
-        let enabled = board.level(ENABLE);
+        let enabled = board.is_enabled();
         let volts = ad5754r::lock(&self.chip).volts();
         for (axis, volts) in volts.into_iter().enumerate() {
             let target = if self.plant {
@@ -213,7 +215,7 @@ impl World {
     }
 
     fn note_enable(&mut self, board: &mut Nucleo, now: u64) {
-        let level = board.level(ENABLE);
+        let level = board.is_enabled();
         if self.enables.last().is_none_or(|last| last.1 != level) {
             self.enables.push((now, level));
         }
@@ -245,9 +247,11 @@ impl Driver<Nucleo> for World {
         };
         let now = access.virtual_time;
         if access.kind == AccessKind::Read {
-            if let Some(axis) = TIMERS
+            if let Some(axis) = self
+                .wiring
+                .encoders
                 .iter()
-                .position(|timer| timer + COUNTER == access.address)
+                .position(|encoder| encoder.base + COUNTER == access.address)
             {
                 self.note_count(axis, value as u32);
             }
@@ -269,7 +273,7 @@ impl Driver<Nucleo> for World {
             TICK_STATUS => {
                 if self.ticks.begun.is_some() {
                     let (counts, codes) = (self.counts, ad5754r::lock(&self.chip).codes());
-                    let enabled = session.board_mut().level(ENABLE);
+                    let enabled = session.board_mut().is_enabled();
                     self.record.push(TickRecord {
                         counts,
                         codes,
@@ -278,13 +282,13 @@ impl Driver<Nucleo> for World {
                 }
                 self.ticks.acknowledge(now.0, access.instruction_count);
             }
-            WATCHDOG_KEY if access.value & 0xFFFF == 0xAAAA => {
+            address if address == self.wiring.watchdog_key && access.value & 0xFFFF == 0xAAAA => {
                 if self.feeds.0 != 0 {
                     self.feeds.1 = self.feeds.1.max(now.0 - self.feeds.0);
                 }
                 self.feeds.0 = now.0;
             }
-            address if PORTS.contains(&address) => {
+            address if self.wiring.ports.contains(&address) => {
                 let board = session.board_mut();
                 self.note_enable(board, now.0);
                 // MODER, AFRL, AFRH: the lines of the encoders reach their timers, or no longer.
@@ -356,6 +360,8 @@ impl Driver<Nucleo> for World {
 
 /// A run of the image.
 pub struct Bench {
+    /// The board's wiring.
+    pub wiring: &'static Wiring,
     orders: SyncSender<Order>,
     model: Option<JoinHandle<Result<(), String>>>,
     /// The converter.
@@ -367,15 +373,16 @@ pub struct Bench {
 
 impl Bench {
     /// Switches the board on, with an image and the contents of the settings' sectors; blank if there are none.
-    pub fn start(image: &Path, settings: Option<&[u8]>) -> Self {
+    pub fn start(image: &Subject, settings: Option<&[u8]>) -> Self {
         Self::start_with_clock(image, settings, HSE_HZ)
     }
 
     /// The same with another rate at OSC_IN, Hz; 0 for none.
-    pub fn start_with_clock(image: &Path, settings: Option<&[u8]>, hse_hz: u64) -> Self {
+    pub fn start_with_clock(image: &Subject, settings: Option<&[u8]>, hse_hz: u64) -> Self {
         let (orders, received) = sync_channel(0);
         let (chip, line) = (Shared::default(), SharedLine::default());
-        let (image, settings) = (image.to_owned(), settings.map(<[u8]>::to_vec));
+        let wiring = image.board;
+        let (image, settings) = (image.clone(), settings.map(<[u8]>::to_vec));
         let around = (chip.clone(), line.clone());
         let run = move || run(&image, settings, hse_hz, &around, received);
         let model = std::thread::Builder::new()
@@ -383,6 +390,7 @@ impl Bench {
             .stack_size(16 << 20)
             .spawn(run);
         Self {
+            wiring,
             orders,
             model: Some(model.expect("a thread")),
             chip,
@@ -499,25 +507,15 @@ impl Bench {
 
     /// Rates of SYSCLK, HCLK, PCLK1, PCLK2, timers of APB 1, timers of APB 2, Hz.
     pub fn clocks(&mut self) -> [u64; 6] {
-        self.with(|_, board, _| {
-            let (rcc, r) = board.mcu.clocks();
-            let timers = [Apb::One, Apb::Two].map(|apb| rcc.timer_clock(r, apb));
-            [
-                rcc.sysclk(r),
-                rcc.hclk(r),
-                rcc.pclk1(r),
-                rcc.pclk2(r),
-                timers[0],
-                timers[1],
-            ]
-        })
+        self.with(|_, board, _| board.clocks())
     }
 
     /// Contents of the settings' sectors.
     pub fn settings_flash(&mut self) -> Vec<u8> {
-        self.with_session(|_, _, host, _| {
-            let word = |offset| host.read(SETTINGS + offset, Width::W32).unwrap_or(0) as u32;
-            (0..SETTINGS_BYTES)
+        let (start, sector) = self.wiring.settings;
+        self.with_session(move |_, _, host, _| {
+            let word = |offset| host.read(start + offset, Width::W32).unwrap_or(0) as u32;
+            (0..2 * sector)
                 .step_by(4)
                 .map(word)
                 .flat_map(u32::to_le_bytes)
@@ -560,6 +558,8 @@ impl Bench {
             );
             all
         });
+        let known = self.wiring.known;
+        all.retain(|text| !known.iter().any(|part| text.contains(part)));
         let chip = ad5754r::lock(&self.chip);
         all.extend(
             chip.complaints
@@ -572,24 +572,30 @@ impl Bench {
 
 /// Runs the image until the bench is dropped.
 fn run(
-    image: &Path,
+    image: &Subject,
     settings: Option<Vec<u8>>,
     hse_hz: u64,
     (chip, line): &(Shared, SharedLine),
     orders: Receiver<Order>,
 ) -> Result<(), String> {
     let text = |error: &dyn std::fmt::Display| error.to_string();
-    let elf = std::fs::read(image).map_err(|e| text(&e))?;
+    let elf = std::fs::read(&image.image).map_err(|e| text(&e))?;
     let symbols = Symbols::read(&elf, |address| address).map_err(|e| text(&e))?;
-    let mut images = vec![Image::read(image, None).map_err(|e| text(&e))?];
+    let mut images = vec![Image::read(&image.image, None).map_err(|e| text(&e))?];
     if let Some(bytes) = settings {
         images.push(
-            Image::new(Path::new("settings.bin"), bytes, Some(SETTINGS)).map_err(|e| text(&e))?,
+            Image::new(
+                Path::new("settings.bin"),
+                bytes,
+                Some(image.board.settings.0),
+            )
+            .map_err(|e| text(&e))?,
         );
     }
-    let board = Nucleo::new(chip, line, hse_hz).map_err(|e| text(&e))?;
+    let board = Nucleo::new(image.board, chip, line, hse_hz).map_err(|e| text(&e))?;
     let session = Session::new(Box::new(board), 0, VirtualNanos(0)).map_err(|e| text(&e))?;
     let world = World {
+        wiring: image.board,
         orders,
         target: None,
         plant: false,

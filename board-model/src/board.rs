@@ -1,64 +1,29 @@
-//! The reference board: chip, crystal, converter, link, and what is wired to its pins.
+//! A board: chip, crystal, converter, link, and what is wired to its pins.
 
 use std::collections::VecDeque;
 use std::num::{NonZeroU32, NonZeroU64};
 use std::sync::{Arc, Mutex};
 
-use rigless::chip::Timeline;
-use rigless::chip::uart;
-use rigless::device::Level;
+use rigless::chip::{Timeline, uart};
+use rigless::device::{DeviceContext, Level, RegisterFile};
 use rigless::machine::{Board, Target, armv7m};
 use rigless::mcu::{Mcu, Operate};
 use rigless::snapshot::{Error as SnapshotError, Reader, Store, Writer};
-use rigless::soc::stm32f427::Stm32f427;
-use rigless::soc::stm32f427::peripherals::gpio::{Gpio, Pin};
-use rigless::soc::stm32f427::peripherals::spi::Select;
-use rigless::soc::stm32f427::peripherals::tim::Channel;
+use rigless::soc::st::gpio::Pin;
+use rigless::soc::stm32f427::{self, Stm32f427};
+use rigless::soc::stm32h743::{self, Stm32h743};
 use rigless::soc::{Error, Width};
 use rigless::time::VirtualNanos;
 
 use crate::ad5754r::{End, Shared, Wire};
+use crate::wiring::{At, Family, TimerModel, Wiring};
 
-/// Instructions a second of virtual time: 180 MHz at 1.8 cycles an instruction. The model counts instructions.
-const INSTRUCTIONS_PER_S: u64 = 100_000_000;
 /// Rate that the debug probe feeds to OSC_IN, Hz.
 pub const HSE_HZ: u64 = 8_000_000;
-
-/// A pin: port (0 for A) and number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct At(pub usize, pub u8);
-
-/// Amplifier enable, high enables.
-pub const ENABLE: At = At(2, 9);
-/// Holding brake, high releases.
-const BRAKE: At = At(1, 5);
-/// Second contact of the emergency stop.
-pub const EMERGENCY_STOP: At = At(0, 0);
-/// Amplifiers ready.
-pub const READY: At = At(0, 1);
-/// Faults of the amplifiers x, y, z.
-pub const FAULTS: [At; 3] = [At(0, 8), At(0, 9), At(0, 10)];
-/// Limits x-, x+, y-, y+, z-, z+.
-pub const LIMITS: [At; 6] = [At(2, 0), At(2, 1), At(2, 2), At(2, 3), At(2, 4), At(2, 5)];
-/// Home switches.
-const HOMES: [At; 3] = [At(2, 10), At(2, 11), At(2, 12)];
-/// Enabling button: low while pressed.
-const BUTTON: At = At(2, 13);
-/// Outputs that a resistor pulls to ground: enable, brake, /CLR.
-const PULLED_DOWN: [At; 3] = [ENABLE, BRAKE, At(1, 2)];
-/// A, B and index of an encoder, with the alternate function that leads them to its timer (data sheet of the F446, table 11).
-const ENCODERS: [[(At, u8); 3]; 3] = [
-    [(At(1, 8), 1), (At(1, 9), 1), (At(1, 10), 1)],
-    [(At(0, 6), 2), (At(0, 7), 2), (At(1, 0), 2)],
-    [(At(2, 6), 3), (At(2, 7), 3), (At(2, 8), 3)],
-];
-/// Base addresses of the encoders' timers: TIM2, TIM3, TIM8.
-pub const TIMERS: [u64; 3] = [0x4000_0000, 0x4000_0400, 0x4001_0400];
 /// Offset of a timer's counter.
 pub const COUNTER: u64 = 0x24;
-/// The port of /SYNC (12), /LDAC (1) and /CLR (2).
-const CONVERTER_WIRES: [(usize, Wire, u8); 3] =
-    [(1, Wire::Bus, 12), (0, Wire::Ldac, 1), (0, Wire::Clr, 2)];
+/// Offset of what a timer has captured on its third channel.
+const CAPTURED: u64 = 0x3C;
 
 /// Far end of the link's line.
 #[derive(Debug, Default)]
@@ -104,101 +69,250 @@ impl uart::Peer for LineEnd {
     }
 }
 
+/// The chip.
+#[derive(Debug)]
+pub enum Chip {
+    /// An STM32F427 in the place of an STM32F446.
+    F4(Box<Stm32f427>),
+    /// An STM32H743.
+    H7(Box<Stm32h743>),
+}
+
 /// The board.
 #[derive(Debug)]
 pub struct Nucleo {
-    /// The chip.
-    pub mcu: Stm32f427,
+    chip: Chip,
+    /// Its wiring.
+    pub wiring: &'static Wiring,
 }
 
 impl Store for Nucleo {
     fn store(&self, to: &mut Writer) -> Result<(), SnapshotError> {
-        self.mcu.store(to)
+        match &self.chip {
+            Chip::F4(chip) => chip.store(to),
+            Chip::H7(chip) => chip.store(to),
+        }
     }
 
     fn load(&mut self, from: &mut Reader) -> Result<(), SnapshotError> {
-        self.mcu.load(from)
+        match &mut self.chip {
+            Chip::F4(chip) => chip.load(from),
+            Chip::H7(chip) => chip.load(from),
+        }
     }
 }
 
-impl Nucleo {
-    /// The board with a converter, a link's line and a rate at OSC_IN, Hz.
-    pub fn new(converter: &Shared, line: &SharedLine, hse_hz: u64) -> Result<Self, Error> {
-        let mut mcu = Stm32f427::new()?;
-        mcu.rcc.attach_crystals(hse_hz, 0);
-        mcu.set_supply(3300);
-        // SPI2 has the bus. /LDAC and /CLR are no chip selects of it; SPI1, which is not used, reports their edges.
-        for (spi, wire, pin) in CONVERTER_WIRES {
-            let select = Select {
-                port: "GPIOB",
+/// Hangs the converter's wires and the link's line on a chip, and fits crystal and supply.
+macro_rules! fit {
+    ($chip:expr, $family:ident, $wiring:expr, $converter:expr, $line:expr, $hse_hz:expr) => {{
+        $chip.rcc.attach_crystals($hse_hz, 0);
+        $chip.set_supply(3300);
+        // /LDAC and /CLR are no chip selects of the bus; an SPI that is not used reports their edges.
+        let [bus, unused] = $wiring.spi;
+        let wires = [(bus, Wire::Bus), (unused, Wire::Ldac), (unused, Wire::Clr)];
+        for ((spi, wire), pin) in wires.into_iter().zip($wiring.converter_pins) {
+            let select = $family::peripherals::spi::Select {
+                port: $wiring.converter_port,
                 pin: pin_of(pin),
-                active: Level::Low,
+                active: wire.active(),
             };
-            mcu.spi[spi].attach_selected(End::new(wire, converter), select);
+            $chip.spi[spi].attach_selected(End::new(wire, $converter), select);
         }
-        mcu.usart[1].attach(LineEnd(line.clone()));
-        Ok(Self { mcu })
+        $chip.usart[$wiring.usart].attach(LineEnd($line.clone()));
+    }};
+}
+
+impl Nucleo {
+    /// A board with a converter, a link's line and a rate at OSC_IN, Hz.
+    pub fn new(
+        wiring: &'static Wiring,
+        converter: &Shared,
+        line: &SharedLine,
+        hse_hz: u64,
+    ) -> Result<Self, Error> {
+        let chip = match wiring.family {
+            Family::F4 => {
+                let mut chip = Box::new(Stm32f427::new()?);
+                fit!(chip, stm32f427, wiring, converter, line, hse_hz);
+                Chip::F4(chip)
+            }
+            Family::H7 => {
+                let mut chip = Box::new(Stm32h743::new()?);
+                fit!(chip, stm32h743, wiring, converter, line, hse_hz);
+                Chip::H7(chip)
+            }
+        };
+        Ok(Self { chip, wiring })
     }
 
     /// The level of a pin.
     pub fn level(&mut self, At(port, pin): At) -> bool {
-        let (gpio, registers) = self.mcu.port(port);
-        gpio.level(pin_of(pin), registers) == Level::High
+        let level = match &mut self.chip {
+            Chip::F4(chip) => {
+                let (gpio, registers) = chip.port(port);
+                gpio.level(pin_of(pin), registers)
+            }
+            Chip::H7(chip) => {
+                let (gpio, registers) = chip.port(port);
+                gpio.level(pin_of(pin), registers)
+            }
+        };
+        level == Level::High
+    }
+
+    /// The level of the amplifiers' enable line.
+    pub fn is_enabled(&mut self) -> bool {
+        self.level(self.wiring.enable)
     }
 
     /// Drives a pin from outside; an output of the chip is stronger.
     pub fn drive(&mut self, now: VirtualNanos, At(port, pin): At, high: bool) {
-        self.mcu.drive_port(now, port, |gpio, registers, context| {
-            gpio.drive(pin_of(pin), Some(Level::from(high)), registers, context);
-        });
+        let (pin, level) = (pin_of(pin), Some(Level::from(high)));
+        match &mut self.chip {
+            Chip::F4(chip) => chip.drive_port(now, port, |gpio, registers, context| {
+                gpio.drive(pin, level, registers, context);
+            }),
+            Chip::H7(chip) => chip.drive_port(now, port, |gpio, registers, context| {
+                gpio.drive(pin, level, registers, context);
+            }),
+        }
     }
 
     /// Drives what is connected as a machine at rest does: contacts closed, button up, pull-downs.
     pub fn drive_all(&mut self, now: VirtualNanos) {
-        let closed = [EMERGENCY_STOP, READY];
+        let wiring = self.wiring;
+        let closed = [wiring.emergency_stop, wiring.ready];
         let low = closed
             .iter()
-            .chain(&FAULTS)
-            .chain(&LIMITS)
-            .chain(&HOMES)
-            .chain(&PULLED_DOWN);
+            .chain(&wiring.faults)
+            .chain(&wiring.limits)
+            .chain(&wiring.homes)
+            .chain(&wiring.pulled_down);
         for &at in low {
             self.drive(now, at, false);
         }
-        self.drive(now, BUTTON, true);
+        let (button, up) = wiring.button;
+        self.drive(now, button, up);
     }
 
     /// Drives a line of an encoder: A, B, index. The level reaches the timer if the pin has that timer's function.
     pub fn encoder_line(&mut self, now: VirtualNanos, axis: usize, line: usize, high: bool) {
-        let (at, function) = ENCODERS[axis][line];
+        let encoder = self.wiring.encoders[axis];
+        let at = encoder.lines[line];
         self.drive(now, at, high);
-        let (_, registers) = self.mcu.port(at.0);
-        if Gpio::function(pin_of(at.1), registers) != Some(function) {
+        let pin = pin_of(at.1);
+        let function = match &mut self.chip {
+            Chip::F4(chip) => stm32f427::peripherals::gpio::Gpio::function(pin, chip.port(at.0).1),
+            Chip::H7(chip) => stm32h743::peripherals::gpio::Gpio::function(pin, chip.port(at.0).1),
+        };
+        if function != Some(encoder.function) {
             return;
         }
-        let channel = Channel::new(line as u8 + 1).expect("a channel");
         let level = Level::from(high);
-        match axis {
-            0 | 1 => self
-                .mcu
-                .drive_timer(now, axis, |t, r, c| t.drive_input(channel, level, r, c)),
-            _ => self
-                .mcu
-                .drive_advanced_timer(now, 1, |t, r, c| t.drive_input(channel, level, r, c)),
+        match &mut self.chip {
+            Chip::F4(chip) => {
+                use stm32f427::peripherals::tim::Channel;
+                let channel = Channel::new(line as u8 + 1).expect("a channel");
+                match encoder.timer {
+                    TimerModel::General(nth) => chip.drive_timer(now, nth, |timer, r, c| {
+                        timer.drive_input(channel, level, r, c)
+                    }),
+                    TimerModel::Advanced(nth) => {
+                        chip.drive_advanced_timer(now, nth, |timer, r, c| {
+                            timer.drive_input(channel, level, r, c)
+                        })
+                    }
+                }
+            }
+            Chip::H7(chip) => {
+                use stm32h743::peripherals::tim::Channel;
+                let channel = Channel::new(line as u8 + 1).expect("a channel");
+                match encoder.timer {
+                    TimerModel::General(nth) => chip.drive_timer(now, nth, |timer, r, c| {
+                        timer.drive_input(channel, level, r, c)
+                    }),
+                    TimerModel::Advanced(nth) => {
+                        chip.drive_advanced_timer(now, nth, |timer, r, c| {
+                            timer.drive_input(channel, level, r, c)
+                        })
+                    }
+                }
+            }
         }
     }
 
     /// Reads a register without the effects of a read.
     pub fn peek(&mut self, now: VirtualNanos, address: u64) -> u32 {
-        self.mcu.peek(now, address, Width::W32).unwrap_or(0) as u32
+        let word = match &mut self.chip {
+            Chip::F4(chip) => chip.peek(now, address, Width::W32),
+            Chip::H7(chip) => chip.peek(now, address, Width::W32),
+        };
+        word.unwrap_or(0) as u32
     }
 
     /// The count of an encoder's timer, and the count captured at its index.
     pub fn counter(&mut self, now: VirtualNanos, axis: usize) -> (u32, u32) {
+        let base = self.wiring.encoders[axis].base;
         (
-            self.peek(now, TIMERS[axis] + COUNTER),
-            self.peek(now, TIMERS[axis] + 0x3C),
+            self.peek(now, base + COUNTER),
+            self.peek(now, base + CAPTURED),
         )
+    }
+
+    /// Sets the supply, mV.
+    pub fn set_supply(&mut self, millivolts: u32) {
+        match &mut self.chip {
+            Chip::F4(chip) => chip.set_supply(millivolts),
+            Chip::H7(chip) => chip.set_supply(millivolts),
+        }
+    }
+
+    /// Lets the clock at OSC_IN fail, for good.
+    pub fn fail_hse(&mut self, now: VirtualNanos) {
+        match &mut self.chip {
+            Chip::F4(chip) => {
+                chip.drive_clocks(now, |rcc, r, c: &mut DeviceContext<'_>| rcc.fail_hse(r, c));
+                chip.rcc.attach_crystals(0, 0);
+            }
+            Chip::H7(chip) => {
+                chip.drive_clocks(now, |rcc, r, c: &mut DeviceContext<'_>| rcc.fail_hse(r, c));
+                chip.rcc.attach_crystals(0, 0);
+            }
+        }
+    }
+
+    /// Rates of SYSCLK, HCLK, PCLK1, PCLK2, timers of APB 1, timers of APB 2, Hz.
+    pub fn clocks(&mut self) -> [u64; 6] {
+        match &mut self.chip {
+            Chip::F4(chip) => {
+                use stm32f427::peripherals::rcc::Apb;
+                let (rcc, r): (_, &mut RegisterFile) = chip.clocks();
+                let timers = [Apb::One, Apb::Two].map(|apb| rcc.timer_clock(r, apb));
+                let buses = [rcc.pclk1(r), rcc.pclk2(r)];
+                [
+                    rcc.sysclk(r),
+                    rcc.hclk(r),
+                    buses[0],
+                    buses[1],
+                    timers[0],
+                    timers[1],
+                ]
+            }
+            Chip::H7(chip) => {
+                use stm32h743::peripherals::rcc::{Apb, TimerBus};
+                let (rcc, r): (_, &mut RegisterFile) = chip.clocks();
+                let timers = [TimerBus::Apb1, TimerBus::Apb2].map(|bus| rcc.timer_clock(r, bus));
+                let buses = [Apb::One, Apb::Two].map(|apb| rcc.pclk(r, apb));
+                [
+                    rcc.sysclk(r),
+                    rcc.hclk(r),
+                    buses[0],
+                    buses[1],
+                    timers[0],
+                    timers[1],
+                ]
+            }
+        }
     }
 }
 
@@ -206,9 +320,16 @@ fn pin_of(number: u8) -> Pin {
     Pin::new(number).expect("a pin")
 }
 
+/// Caches of the STM32H743 as its core describes them: CLIDR, CTR and CCSIDR (PM0253, tables 77 and 81). The model has none.
+const CACHES: armv7m::Caches = armv7m::Caches {
+    clidr: 0x0900_0003,
+    ctr: 0x8303_C003,
+    ccsidr: &[0xF00F_E019, 0xF01F_E009],
+};
+
 impl Board for Nucleo {
     fn name(&self) -> &'static str {
-        "nucleo-f446re"
+        self.wiring.name
     }
 
     fn target_names(&self) -> Vec<&'static str> {
@@ -216,22 +337,54 @@ impl Board for Nucleo {
     }
 
     fn mcu(&mut self, target: usize) -> Option<&mut dyn Mcu> {
-        (target == 0).then_some(&mut self.mcu)
+        let chip: &mut dyn Mcu = match &mut self.chip {
+            Chip::F4(chip) => chip.as_mut(),
+            Chip::H7(chip) => chip.as_mut(),
+        };
+        (target == 0).then_some(chip)
     }
 
     fn targets(&mut self) -> Vec<Target<'_>> {
-        let lines = u32::from(Operate::cpu(&self.mcu).interrupt_lines);
+        let (variant, lines) = match &self.chip {
+            Chip::F4(chip) => (
+                armv7m::Variant::M4,
+                Operate::cpu(chip.as_ref()).interrupt_lines,
+            ),
+            Chip::H7(chip) => (
+                armv7m::Variant::M7,
+                Operate::cpu(chip.as_ref()).interrupt_lines,
+            ),
+        };
         let core = armv7m::Core {
-            variant: armv7m::Variant::M4,
-            clock_hz: NonZeroU64::new(180_000_000).expect("a clock"),
-            interrupt_lines: NonZeroU32::new(lines).expect("lines"),
+            variant,
+            clock_hz: NonZeroU64::new(self.wiring.core_hz).expect("a clock"),
+            interrupt_lines: NonZeroU32::new(u32::from(lines)).expect("lines"),
             priority_bits: 4,
             refclk_divider: NonZeroU32::new(8).expect("a divider"),
-            instructions_per_second: NonZeroU64::new(INSTRUCTIONS_PER_S).expect("a rate"),
+            instructions_per_second: NonZeroU64::new(self.wiring.instructions_per_s)
+                .expect("a rate"),
             boot: "flash",
         };
-        let windows = rigless::cpu::armv7m::windows(Mcu::bus(&self.mcu));
-        let spec = core.spec_with_parts(&windows, armv7m::Fpu::FpV4Sp, armv7m::MpuRegions::Eight);
-        vec![Target::new("stm32", &mut self.mcu, spec)]
+        match &mut self.chip {
+            Chip::F4(chip) => {
+                let windows = rigless::cpu::armv7m::windows(Mcu::bus(chip.as_ref()));
+                let spec =
+                    core.spec_with_parts(&windows, armv7m::Fpu::FpV4Sp, armv7m::MpuRegions::Eight);
+                vec![Target::new("stm32", chip.as_mut(), spec)]
+            }
+            Chip::H7(chip) => {
+                let windows = rigless::cpu::armv7m::windows(Mcu::bus(chip.as_ref()));
+                let mut config = armv7m::Config::new(core, &windows);
+                config.fpu = armv7m::Fpu::FpV5Dp;
+                config.mpu_regions = armv7m::MpuRegions::Sixteen;
+                // Cortex-M7 r1p1 (ES0392, 2.1).
+                config.cpuid = 0x411F_C271;
+                config.caches = Some(CACHES);
+                config.branch_prediction = armv7m::BranchPrediction::Always;
+                // BOOT_ADD0 as delivered (RM0433, table 9).
+                config.vector_table = Some(0x0800_0000);
+                vec![Target::new("stm32", chip.as_mut(), config.spec())]
+            }
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! The reference board's image on a chip model that others wrote: see README.md.
+//! A board's image on a chip model that others wrote: see README.md.
 
 mod ad5754r;
 mod bench;
@@ -8,24 +8,30 @@ mod log;
 mod report;
 mod scenarios;
 mod stage;
+mod wiring;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use clap::Parser;
 
+use crate::bench::Subject;
 use crate::report::Report;
 use crate::scenarios::{SCENARIOS, Scenario};
+use crate::wiring::BOARDS;
 
-/// Run the reference board's image on a model of its chip, and compare what it does with manuals and documentation.
+/// Run a board's image on a model of its chip, and compare what it does with manuals and documentation.
 #[derive(Parser)]
 #[command(name = "cargo xtask board-run", bin_name = "cargo xtask board-run")]
 struct Options {
     /// The image [default: built from the tree]
     #[arg(long, required_unless_present = "list")]
     image: Option<PathBuf>,
+    /// The board that the image is for
+    #[arg(long, default_value = BOARDS[0].name, value_parser = BOARDS.map(|board| board.name))]
+    board: String,
     /// Names the scenarios
     #[arg(long)]
     list: bool,
@@ -57,7 +63,11 @@ fn main() -> ExitCode {
     let chosen = SCENARIOS
         .iter()
         .filter(|s| options.only.is_empty() || options.only.iter().any(|n| n == s.name));
-    let image = options.image.unwrap_or_default();
+    let board = BOARDS.into_iter().find(|board| board.name == options.board);
+    let image = Subject {
+        image: options.image.unwrap_or_default(),
+        board: board.unwrap_or(BOARDS[0]),
+    };
     log::SHOWN.store(options.log, Ordering::Relaxed);
     let started = Instant::now();
     let (mut rows, mut failed) = (0, 0);
@@ -78,7 +88,7 @@ fn main() -> ExitCode {
 }
 
 /// Runs a scenario and prints its rows.
-fn run(scenario: &Scenario, image: &Path) -> Report {
+fn run(scenario: &Scenario, image: &Subject) -> Report {
     let started = Instant::now();
     let mut report = Report::default();
     if let Err(error) = (scenario.run)(image, &mut report) {

@@ -29,7 +29,7 @@ struct Product {
 const HOST: &str = "x86_64-unknown-linux-gnu";
 
 /// All of them.
-const PRODUCTS: [Product; 5] = [
+const PRODUCTS: [Product; 6] = [
     Product {
         name: "command",
         package: "quadrant-cli",
@@ -44,6 +44,14 @@ const PRODUCTS: [Product; 5] = [
         manifest: "Cargo.toml",
         triple: "thumbv7em-none-eabihf",
         features: "board-nucleo-f446re",
+        kind: Classification::Firmware,
+    },
+    Product {
+        name: "nucleo-h743zi2",
+        package: "quadrant",
+        manifest: "Cargo.toml",
+        triple: "thumbv7em-none-eabihf",
+        features: "board-nucleo-h743zi2",
         kind: Classification::Firmware,
     },
     Product {

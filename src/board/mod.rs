@@ -19,8 +19,15 @@
 //!
 //! `docs/porting.md` describes how a board is added.
 
-#[cfg(all(feature = "board-mps2", feature = "board-nucleo-f446re"))]
-compile_error!("choose one board: `board-mps2` or `board-nucleo-f446re`, not both");
+#[cfg(any(
+    all(feature = "board-mps2", feature = "board-nucleo-f446re"),
+    all(feature = "board-mps2", feature = "board-nucleo-h743zi2"),
+    all(feature = "board-nucleo-f446re", feature = "board-nucleo-h743zi2")
+))]
+compile_error!("choose one board: `board-mps2`, `board-nucleo-f446re` or `board-nucleo-h743zi2`");
+
+#[cfg(all(feature = "output-on-chip", feature = "board-nucleo-h743zi2"))]
+compile_error!("`output-on-chip` is of `board-nucleo-f446re` alone");
 
 pub(crate) mod crash_record;
 mod fault;
@@ -33,10 +40,20 @@ mod mps2;
 #[cfg(feature = "board-mps2")]
 pub(crate) use mps2::*;
 
-#[cfg(all(feature = "board-nucleo-f446re", not(feature = "board-mps2")))]
+#[cfg(feature = "board-nucleo-f446re")]
 mod nucleo_f446re;
-#[cfg(all(feature = "board-nucleo-f446re", not(feature = "board-mps2")))]
+#[cfg(feature = "board-nucleo-f446re")]
 pub(crate) use nucleo_f446re::*;
+
+#[cfg(feature = "board-nucleo-h743zi2")]
+mod nucleo_h743zi2;
+#[cfg(feature = "board-nucleo-h743zi2")]
+pub(crate) use nucleo_h743zi2::*;
+
+#[cfg(any(feature = "board-nucleo-f446re", feature = "board-nucleo-h743zi2"))]
+mod stm32;
+#[cfg(any(feature = "board-nucleo-f446re", feature = "board-nucleo-h743zi2"))]
+pub(crate) use stm32::*;
 
 /// Forgets that the thread has used the floating-point unit, which the start has: until then every interrupt makes room for
 /// its registers, 26 words instead of 8. To be called by the idle thread, which computes with none.

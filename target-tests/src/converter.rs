@@ -1,4 +1,4 @@
-//! Cycles that the reference board's converter takes of the control interrupt: what is emulated has no converter.
+//! Cycles that a board's converter takes of the control interrupt: what is emulated has no converter.
 //!
 //! The code of its driver has no loop but the wait that an interrupt meets when it follows the one before at once, which is a
 //! function of its own. So the sum of all its instructions, each taken once, bounds every path through it.
@@ -16,17 +16,19 @@ use xtask::prove::ROOT;
 use xtask::toolchain::Toolchain;
 
 /// Functions that are the converter's: at the beginning of a tick, and when it has computed its outputs.
-pub(crate) const BEGIN: &str = "<quadrant_firmware::board::nucleo_f446re::amplifiers::Amplifiers as quadrant::hal::Amplifiers>::begin";
+pub(crate) const BEGIN: &str =
+    "<quadrant_firmware::board::stm32::amplifiers::Amplifiers as quadrant::hal::Amplifiers>::begin";
 /// See [`BEGIN`].
-pub(crate) const WRITE: &str = "<quadrant_firmware::board::nucleo_f446re::amplifiers::Amplifiers as quadrant::hal::Amplifiers>::write";
-/// The register that starts the timer.
-const START: &str = "stm32f446::tim1::cr1::";
+pub(crate) const WRITE: &str =
+    "<quadrant_firmware::board::stm32::amplifiers::Amplifiers as quadrant::hal::Amplifiers>::write";
+/// The register that starts the timer, behind the name of the chip.
+const START: &str = "::tim1::cr1::";
 /// The function that waits, by the end of its name.
 const WAIT: &str = "ConverterBus>::wait";
 
 /// Registers behind a bridge to a slower bus, by the type of their peripheral, and the cycles that an access takes at most beyond the
 /// processor's own: three clocks of that bus, one of them to wait for its edge.
-const BRIDGES: [(&str, u32); 2] = [
+pub(crate) const BRIDGES: [(&str, u32); 2] = [
     // APB 2, at half of the processor's clock.
     ("stm32f4::stm32f446::tim1::", 6),
     // APB 1, at a quarter.
@@ -53,6 +55,7 @@ pub(crate) fn cycles(
     of: &str,
     line_bytes: u32,
     cycles_a_line: u32,
+    bridges: &[(&str, u32)],
 ) -> Result<Bound> {
     let listing = Listing::of(image)?;
     let root = listing
@@ -83,7 +86,7 @@ pub(crate) fn cycles(
             Flow::Indirect => bail!("the converter's code jumps anywhere"),
         }
         successors.insert(instruction.address, followers);
-        cycles += bridge(&functions);
+        cycles += bridge(&functions, bridges);
         let entered = instruction.address / line_bytes;
         if line.replace(entered) != Some(entered) {
             cycles += cycles_a_line;
@@ -133,14 +136,14 @@ fn has_loop(mut successors: BTreeMap<u32, Vec<u32>>) -> bool {
     }
 }
 
-/// Cycles that the bridge adds to an instruction, by the functions it was inlined into, innermost first.
-fn bridge(functions: &[String]) -> u32 {
+/// Cycles that a bridge adds to an instruction, by the functions it was inlined into, innermost first.
+pub(crate) fn bridge(functions: &[String], bridges: &[(&str, u32)]) -> u32 {
     let accesses = |name: &String| name.starts_with("core::ptr::");
     if !functions.first().is_some_and(accesses) {
         return 0;
     }
-    BRIDGES
-        .into_iter()
+    bridges
+        .iter()
         .filter(|(register, _)| functions.iter().any(|name| name.contains(register)))
         .map(|(_, cycles)| cycles)
         .sum()
@@ -167,7 +170,7 @@ mod tests {
     fn only_an_access_to_a_register_behind_a_bridge_costs_more() {
         let of = |functions: &[&str]| {
             let functions: Vec<String> = functions.iter().map(|name| name.to_string()).collect();
-            bridge(&functions)
+            bridge(&functions, &BRIDGES)
         };
         let register = "<stm32f4::generic::Reg<stm32f4::stm32f446::spi1::cr1::CR1rs>>::write";
         assert_eq!(of(&["core::ptr::write_volatile::<u16>", register]), 12);

@@ -12,6 +12,7 @@ use crate::converter;
 use crate::cortex_m::{Core, ENTRY_AND_RETURN, REFILL, reads_literal};
 use crate::kinds::{Kinds, emulated};
 use crate::longest_path::{OUTSIDE, Transitions, whole};
+use crate::nucleo_h743zi2;
 use crate::trace::Tick;
 use xtask::golden::{self, Golden};
 use xtask::image::{Image, Scalar};
@@ -90,7 +91,8 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: b
     // The reference board computes in f32.
     if scalar == Scalar::F32 {
         let image = converter::image(toolchain)?;
-        let bound = |of, a_line| converter::cycles(&image, of, LINE_BYTES, a_line);
+        let bound =
+            |of, a_line| converter::cycles(&image, of, LINE_BYTES, a_line, &converter::BRIDGES);
         let (begin, write) = (bound(converter::BEGIN, 0)?, bound(converter::WRITE, 0)?);
         let no_cache = bound(converter::BEGIN, WAIT_STATES)?.cycles
             + bound(converter::WRITE, WAIT_STATES)?.cycles;
@@ -110,6 +112,7 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: b
         print("with it", bounds.no_wait_states + converter.no_wait_states);
         print("with it, no cache", bounds.no_cache + converter.no_cache);
         held.push(("converter".into(), converter));
+        nucleo_h743zi2::print(toolchain, &code, &kinds)?;
     }
     if overwrite {
         return GOLDEN.store(Some(&image.compiler), held);
@@ -162,15 +165,17 @@ fn compare(key: &str, bounds: Bounds, compiler: &str) -> Result<()> {
 }
 
 /// The image's instructions, by address, each with the address behind it.
-struct Code {
+pub(crate) struct Code {
     instructions: BTreeMap<u32, (Timed, u32)>,
 }
 
 /// An instruction's share of the time.
 #[derive(Clone, Copy)]
-struct Timed {
-    cycles: u32,
-    literal: Option<u32>,
+pub(crate) struct Timed {
+    /// Without a refill and without wait states.
+    pub(crate) cycles: u32,
+    /// The address of what it reads from where the code is.
+    pub(crate) literal: Option<u32>,
 }
 
 impl Code {
@@ -193,7 +198,8 @@ impl Code {
         Ok(Self { instructions })
     }
 
-    fn at(&self, address: u32) -> Option<(Timed, u32)> {
+    /// The instruction at an address, and the address behind it.
+    pub(crate) fn at(&self, address: u32) -> Option<(Timed, u32)> {
         self.instructions.get(&address).copied()
     }
 
@@ -222,7 +228,7 @@ impl Code {
     }
 
     /// Cycles along a path, without wait states.
-    fn along(&self, path: &[u32]) -> u32 {
+    pub(crate) fn along(&self, path: &[u32]) -> u32 {
         let pairs = whole(path);
         pairs
             .windows(2)

@@ -21,6 +21,7 @@ mod load;
 mod lockstep;
 mod longest_path;
 mod near_home;
+mod nucleo_h743zi2;
 mod peer;
 mod reference_model;
 mod saturation;

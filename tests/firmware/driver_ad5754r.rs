@@ -11,13 +11,39 @@ use quadrant::drivers::ad5754r::steps::{
 use quadrant::drivers::ad5754r::{ALL_ZERO, Ad5754r, Error, Item, Sequencer};
 
 #[path = "../../src/board/nucleo_f446re/bus_times.rs"]
-mod bus_times;
+mod nucleo_f446re;
+#[path = "../../src/board/nucleo_h743zi2/bus_times.rs"]
+mod nucleo_h743zi2;
 
-use bus_times::{READING, TIMER_HZ, WRITING};
+/// Times of a board's bus.
+#[derive(Clone, Copy)]
+struct Times {
+    timer_hz: u32,
+    writing: Hardware,
+    reading: Hardware,
+}
 
-/// Nanoseconds of a number of cycles.
-fn ns(cycles: u64) -> f64 {
-    cycles as f64 * 1e9 / f64::from(TIMER_HZ)
+const REFERENCE: Times = Times {
+    timer_hz: nucleo_f446re::TIMER_HZ,
+    writing: nucleo_f446re::WRITING,
+    reading: nucleo_f446re::READING,
+};
+
+/// Those of both boards.
+const BOARDS: [Times; 2] = [
+    REFERENCE,
+    Times {
+        timer_hz: nucleo_h743zi2::TIMER_HZ,
+        writing: nucleo_h743zi2::WRITING,
+        reading: nucleo_h743zi2::READING,
+    },
+];
+
+impl Times {
+    /// Nanoseconds of a number of cycles.
+    fn ns(self, cycles: u64) -> f64 {
+        cycles as f64 * 1e9 / f64::from(self.timer_hz)
+    }
 }
 
 /// A frame that ended, and the cycle at which it did.
@@ -25,6 +51,7 @@ type Frame = (u64, [u8; 3]);
 
 /// The chip: what it sees at its pins, and what it rejects.
 struct Chip {
+    times: Times,
     selected: bool,
     sync_changed: u64,
     load_fell: Option<u64>,
@@ -49,8 +76,9 @@ struct Chip {
 }
 
 impl Chip {
-    fn new() -> Self {
+    fn new(times: Times) -> Self {
         Self {
+            times,
             selected: false,
             sync_changed: 0,
             load_fell: None,
@@ -71,8 +99,9 @@ impl Chip {
     }
 
     fn at_least(&mut self, what: &str, cycles: u64, least_ns: f64) {
-        if ns(cycles) < least_ns {
-            let words = format!("{what}: {:.0} ns instead of {least_ns}", ns(cycles));
+        let ns = self.times.ns(cycles);
+        if ns < least_ns {
+            let words = format!("{what}: {ns:.0} ns instead of {least_ns}");
             self.rejected.push(words);
         }
     }
@@ -166,7 +195,7 @@ impl Chip {
                 let place = self.bits.len();
                 self.bits.push(byte >> (7 - bit) & 1 == 1);
                 // SDO follows the rising edge after 40 ns; before that it is anything, here the other level.
-                let valid = ns(fall - rise) > 40.0;
+                let valid = self.times.ns(fall - rise) > 40.0;
                 let level = self
                     .answer
                     .get(place / 8)
@@ -206,6 +235,14 @@ struct Bus(Rc<RefCell<Model>>);
 struct Stuck;
 
 impl Model {
+    fn write(&mut self, bytes: &[u8]) {
+        self.run(bytes, self.chip.times.writing);
+    }
+
+    fn read(&mut self, bytes: &[u8]) {
+        self.run(bytes, self.chip.times.reading);
+    }
+
     /// Takes all steps of a sequence that begins now.
     fn run(&mut self, bytes: &[u8], hardware: Hardware) {
         assert!(self.end <= self.now, "the timer was still counting");
@@ -249,12 +286,12 @@ impl Sequencer for Bus {
         for (at, frame) in FRAMES_AT.into_iter().zip(frames) {
             bytes[at..at + 3].copy_from_slice(&frame);
         }
-        self.0.borrow_mut().run(&bytes, WRITING);
+        self.0.borrow_mut().write(&bytes);
     }
 
     fn start_reading(&mut self, [first, second, third]: [u8; 3]) {
         let bytes: [u8; FRAME_STEPS] = [first, second, third, 0];
-        self.0.borrow_mut().run(&bytes, READING);
+        self.0.borrow_mut().read(&bytes);
     }
 
     fn finish(&mut self) -> Result<[u8; 3], Stuck> {
@@ -286,11 +323,16 @@ const COMPUTING: u64 = 5_000;
 type Outcome = Result<(), Error<Stuck>>;
 
 impl Bench {
-    /// A converter whose /CLR will take these levels, and whose writes are delayed.
+    /// A converter of the reference board whose /CLR will take these levels, and whose writes are delayed.
     fn new(clear: &[State], delays: impl FnMut() -> u64 + 'static) -> Self {
+        Self::on(REFERENCE, clear, delays)
+    }
+
+    /// One of any board.
+    fn on(times: Times, clear: &[State], delays: impl FnMut() -> u64 + 'static) -> Self {
         let model = Rc::new(RefCell::new(Model {
             now: PERIOD,
-            chip: Chip::new(),
+            chip: Chip::new(times),
             end: 0,
             received: Vec::new(),
             delays: Box::new(delays),
@@ -310,9 +352,14 @@ impl Bench {
 
     /// One that has been started, with further levels of /CLR.
     fn started(clear: &[State], delays: impl FnMut() -> u64 + 'static) -> Self {
+        Self::started_on(REFERENCE, clear, delays)
+    }
+
+    /// The same on any board.
+    fn started_on(times: Times, clear: &[State], delays: impl FnMut() -> u64 + 'static) -> Self {
         let mut levels = vec![State::Low, State::High];
         levels.extend(clear);
-        let mut bench = Self::new(&levels, delays);
+        let mut bench = Self::on(times, &levels, delays);
         assert_eq!(bench.converter.start(), Ok(()));
         bench.pass(PERIOD);
         bench.chip(|chip| chip.frames.clear());
@@ -353,20 +400,20 @@ impl Bench {
 }
 
 /// Delays from zero to the largest, differently in each run.
-fn random(seed: u64) -> impl FnMut() -> u64 {
+fn random(times: Times, seed: u64) -> impl FnMut() -> u64 {
     let mut state = seed | 1;
     move || {
         state ^= state << 13;
         state ^= state >> 7;
         state ^= state << 17;
-        state % (u64::from(WRITING.late_cycles) + 1)
+        state % (u64::from(times.writing.late_cycles) + 1)
     }
 }
 
 /// Either none or the largest delay.
-fn extreme(seed: u64) -> impl FnMut() -> u64 {
-    let mut random = random(seed);
-    move || (random() & 1) * u64::from(WRITING.late_cycles)
+fn extreme(times: Times, seed: u64) -> impl FnMut() -> u64 {
+    let mut random = random(times, seed);
+    move || (random() & 1) * u64::from(times.writing.late_cycles)
 }
 
 fn none() -> u64 {
@@ -465,14 +512,17 @@ fn three_codes_take_effect_together_in_every_tick_and_one_register_is_read_after
 
 #[test]
 fn the_chip_minds_no_time_however_late_dma_is() {
-    for seed in 1..200 {
+    for (times, seed) in BOARDS
+        .into_iter()
+        .flat_map(|times| (1..200).map(move |seed| (times, seed)))
+    {
         for extremely in [false, true] {
             let delays: Box<dyn FnMut() -> u64> = if extremely {
-                Box::new(extreme(seed))
+                Box::new(extreme(times, seed))
             } else {
-                Box::new(random(seed))
+                Box::new(random(times, seed))
             };
-            let mut bench = Bench::started(&[], delays);
+            let mut bench = Bench::started_on(times, &[], delays);
             for tick in 0..12 {
                 let code = (seed as i16).wrapping_mul(7919).wrapping_add(tick);
                 assert_eq!(bench.tick([code, -code, !code]), Ok(()), "seed {seed}");
@@ -484,44 +534,49 @@ fn the_chip_minds_no_time_however_late_dma_is() {
 
 #[test]
 fn a_step_that_is_shorter_by_more_than_half_a_bit_is_minded() {
-    let mut bench = Bench::started(&[], extreme(3));
-    bench.model.borrow_mut().hurry = WRITING.bit_cycles / 2 + 1;
-    for tick in 0..200 {
-        let _ = bench.tick_after([tick; 3], COMPUTING);
-        bench.pass(PERIOD);
+    for times in BOARDS {
+        let mut bench = Bench::started_on(times, &[], extreme(times, 3));
+        bench.model.borrow_mut().hurry = times.writing.bit_cycles / 2 + 1;
+        for tick in 0..200 {
+            let _ = bench.tick_after([tick; 3], COMPUTING);
+            bench.pass(PERIOD);
+        }
+        let rejected = bench.chip(|chip| std::mem::take(&mut chip.rejected));
+        assert!(
+            rejected
+                .iter()
+                .any(|words| words.starts_with("clock to /SYNC")),
+            "{rejected:?}"
+        );
+        bench.done();
     }
-    let rejected = bench.chip(|chip| std::mem::take(&mut chip.rejected));
-    assert!(
-        rejected
-            .iter()
-            .any(|words| words.starts_with("clock to /SYNC")),
-        "{rejected:?}"
-    );
-    bench.done();
 }
 
 #[test]
 fn the_codes_are_out_before_a_write_with_waits_had_them_out_and_nobody_waits() {
-    let mut bench = Bench::started(&[], extreme(5));
-    bench.model.borrow_mut().waited = 0;
-    let mut latest = 0;
-    for tick in 0..100 {
-        let begun = bench.model.borrow().now;
-        assert_eq!(bench.tick([tick, 0, 0]), Ok(()));
-        let loaded = bench.chip(|chip| *chip.loads.last().unwrap());
-        latest = latest.max(loaded - begun - COMPUTING);
+    for times in BOARDS {
+        let mut bench = Bench::started_on(times, &[], extreme(times, 5));
+        bench.model.borrow_mut().waited = 0;
+        let mut latest = 0;
+        for tick in 0..100 {
+            let begun = bench.model.borrow().now;
+            assert_eq!(bench.tick([tick, 0, 0]), Ok(()));
+            let loaded = bench.chip(|chip| *chip.loads.last().unwrap());
+            latest = latest.max(loaded - begun - COMPUTING);
+        }
+        let latest = times.ns(latest);
+        println!("write to /LDAC: at most {latest:.0} ns");
+        assert!(latest <= f64::from(times.writing.load_ns()));
+        // What three fast frames, a slow one and the waits between them took before /LDAC, bus and pins alone.
+        assert!(times.writing.load_ns() < 8_135);
+        assert_eq!(bench.model.borrow().waited, 0);
+        bench.done();
     }
-    println!("write to /LDAC: at most {:.0} ns", ns(latest));
-    assert!(ns(latest) <= f64::from(WRITING.load_ns()));
-    // What three fast frames, a slow one and the waits between them took before /LDAC, bus and pins alone.
-    assert!(WRITING.load_ns() < 8_135);
-    assert_eq!(bench.model.borrow().waited, 0);
-    bench.done();
 }
 
 #[test]
 fn a_tick_that_follows_the_one_before_at_once_waits_for_its_end_and_loses_nothing() {
-    let mut bench = Bench::started(&[], random(9));
+    let mut bench = Bench::started(&[], random(REFERENCE, 9));
     for tick in 0..40 {
         // Overrun: the next tick begins with the write of this one under way, and its own reading is not over when it writes.
         let codes = [tick, 2 * tick, -tick];
@@ -534,8 +589,8 @@ fn a_tick_that_follows_the_one_before_at_once_waits_for_its_end_and_loses_nothin
     assert_eq!(bench.chip(|chip| chip.codes), codes);
     let waited = bench.model.borrow().waited;
     let (writing, reading) = (
-        WRITING.step_cycles() * MAX_STEPS as u32,
-        READING.step_cycles() * FRAME_STEPS as u32,
+        REFERENCE.writing.step_cycles() * MAX_STEPS as u32,
+        REFERENCE.reading.step_cycles() * FRAME_STEPS as u32,
     );
     assert!(waited > 0 && waited <= 41 * u64::from(writing + reading));
     bench.done();
@@ -543,7 +598,7 @@ fn a_tick_that_follows_the_one_before_at_once_waits_for_its_end_and_loses_nothin
 
 #[test]
 fn a_tick_that_is_late_loses_nothing() {
-    let mut bench = Bench::started(&[], random(11));
+    let mut bench = Bench::started(&[], random(REFERENCE, 11));
     for tick in 0..20 {
         assert_eq!(bench.tick([tick, 1, 2]), Ok(()));
         bench.pass(u64::from(tick as u16) * 10 * PERIOD);
@@ -676,11 +731,14 @@ fn a_reading_that_does_not_come_to_its_end_is_reported_by_the_write() {
 
 #[test]
 fn a_write_ends_well_within_a_control_period_at_the_highest_rate() {
-    let (load, writing, reading) = (
-        WRITING.load_ns(),
-        WRITING.steps_ns(MAX_STEPS),
-        READING.steps_ns(FRAME_STEPS),
-    );
-    println!("write to /LDAC {load} ns, all of a write {writing} ns, a reading {reading} ns");
-    assert_eq!((load, writing, reading), (7_812, 11_500, 7_356));
+    let of = |times: Times| {
+        (
+            times.writing.load_ns(),
+            times.writing.steps_ns(MAX_STEPS),
+            times.reading.steps_ns(FRAME_STEPS),
+        )
+    };
+    let both = BOARDS.map(of);
+    println!("write to /LDAC, all of a write, a reading, ns: {both:?}");
+    assert_eq!(both, [(7_812, 11_500, 7_356), (8_109, 11_925, 7_150)]);
 }

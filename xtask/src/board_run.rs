@@ -1,4 +1,4 @@
-//! `cargo xtask board-run`: the package `board-model`, which runs the reference board's image on a model of its chip.
+//! `cargo xtask board-run`: the package `board-model`, which runs a board's image on a model of its chip.
 //!
 //! The chip model is `rigless` of the crate registry. It lacks some of what the image needs, and a package cannot patch another
 //! one's source, so a patched copy of it is made below `target`.
@@ -8,6 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
+use clap::ValueEnum;
 use xtask::command;
 use xtask::image::{self, Board, Scalar, Target};
 use xtask::toolchain::{Choice, Toolchain};
@@ -34,11 +35,26 @@ pub(crate) fn run(toolchain: Option<Choice>, options: Vec<OsString>) -> Result<(
             .any(|option| names.iter().any(|name| option == name))
     };
     if !given(&["--image", "--list", "--help", "-h"]) {
-        let target = Target::new(Board::NucleoF446re, Scalar::F32);
+        let target = Target::new(board(&options)?, Scalar::F32);
         let image = image::build(Toolchain::chosen(toolchain)?, target)?;
         model.arg("--image").arg(image.path);
     }
     command::run_quietly(model.args(options))
+}
+
+/// The board that the options name; the reference board if they name none. The program itself has the same option.
+fn board(options: &[OsString]) -> Result<Board> {
+    let mut options = options.iter().map(|option| option.to_string_lossy());
+    while let Some(option) = options.next() {
+        let name = match option.strip_prefix("--board") {
+            Some("") => options.next(),
+            Some(rest) => rest.strip_prefix('=').map(|name| name.to_owned().into()),
+            None => continue,
+        };
+        let name = name.unwrap_or_default();
+        return Board::from_str(&name, true).map_err(anyhow::Error::msg);
+    }
+    Ok(Board::NucleoF446re)
 }
 
 /// Builds the package and returns its program.

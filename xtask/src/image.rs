@@ -1,6 +1,7 @@
 //! Building the firmware's images and looking at what came out.
 
 use std::fmt;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -27,6 +28,20 @@ pub enum Board {
     /// ST Nucleo-F446RE, the reference board
     #[value(name = "nucleo-f446re")]
     NucleoF446re,
+    /// ST Nucleo-H743ZI2
+    #[value(name = "nucleo-h743zi2")]
+    NucleoH743zi2,
+}
+
+impl Board {
+    /// Addresses of the stored settings, which no image may be loaded over, of a board that keeps any in flash.
+    pub const fn settings(self) -> Option<Range<u64>> {
+        match self {
+            Self::Mps2 => None,
+            Self::NucleoF446re => Some(0x0800_4000..0x0800_C000),
+            Self::NucleoH743zi2 => Some(0x081C_0000..0x0820_0000),
+        }
+    }
 }
 
 /// The firmware's number types.
@@ -48,12 +63,13 @@ pub struct Target {
 }
 
 impl Target {
-    /// All there are: each board in each number type.
-    pub const ALL: [Self; 4] = [
+    /// All that are released and tested: each board in each number type, but the fastest in floating point alone.
+    pub const ALL: [Self; 5] = [
         Self::new(Board::Mps2, Scalar::F32),
         Self::new(Board::Mps2, Scalar::Fixed),
         Self::new(Board::NucleoF446re, Scalar::F32),
         Self::new(Board::NucleoF446re, Scalar::Fixed),
+        Self::new(Board::NucleoH743zi2, Scalar::F32),
     ];
 
     /// The firmware of a board in a number type.
@@ -83,6 +99,7 @@ impl Target {
         let board = match self.board {
             Board::Mps2 => "board-mps2",
             Board::NucleoF446re => "board-nucleo-f446re",
+            Board::NucleoH743zi2 => "board-nucleo-h743zi2",
         };
         let number = match self.scalar {
             Scalar::F32 => "",

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use anyhow::{Context, Result, bail, ensure};
 use object::read::elf::{FileHeader, ProgramHeader};
-use object::{Endianness, Object, ObjectSection, elf};
+use object::{Endianness, Object, ObjectSection, ObjectSymbol, elf};
 use serde::{Deserialize, Serialize};
 
 use crate::frames::pointers_in_code;
@@ -16,8 +16,6 @@ use xtask::golden::{self, Golden};
 use xtask::image::{Board, Image, Target};
 use xtask::listing::{Instruction, Listing};
 
-/// The reference board's sectors of stored settings.
-const SETTINGS: Range<u64> = 0x0800_4000..0x0800_C000;
 /// The reference board's flash.
 const FLASH: Range<u32> = 0x0800_0000..0x0808_0000;
 /// Growth that is no news, share of the committed size: compilers differ by as much.
@@ -53,9 +51,14 @@ impl Sizes {
 /// Checks an image's layout, and its sizes against the committed ones; `overwrite` commits these.
 pub(crate) fn check(image: &Image, overwrite: bool) -> Result<()> {
     stack_is_at_the_bottom(image)?;
+    if let Some(settings) = image.target.board.settings() {
+        settings_are_left_alone(image, &settings)?;
+    }
     if image.target.board == Board::NucleoF446re {
-        settings_are_left_alone(image)?;
         erasing_calls_nothing(image)?;
+    }
+    if image.target.board == Board::NucleoH743zi2 {
+        streams_reach_their_memory(image)?;
     }
     let sizes = Sizes::of(image)?;
     println!(
@@ -99,7 +102,7 @@ fn stack_is_at_the_bottom(image: &Image) -> Result<()> {
 }
 
 /// No part of the image is loaded into the sectors of the settings.
-fn settings_are_left_alone(image: &Image) -> Result<()> {
+fn settings_are_left_alone(image: &Image, settings: &Range<u64>) -> Result<()> {
     let header = elf::FileHeader32::<Endianness>::parse(&*image.elf)?;
     let endian = header.endian()?;
     for segment in header.program_headers(endian, &*image.elf)? {
@@ -107,11 +110,38 @@ fn settings_are_left_alone(image: &Image) -> Result<()> {
         let end = start + u64::from(segment.p_filesz(endian));
         let is_loaded = segment.p_type(endian) == elf::PT_LOAD && end > start;
         ensure!(
-            !is_loaded || end <= SETTINGS.start || start >= SETTINGS.end,
+            !is_loaded || end <= settings.start || start >= settings.end,
             "{}: {start:#010x} to {end:#010x} is loaded over the stored settings at {:#010x} to {:#010x}",
             image.target,
-            SETTINGS.start,
-            SETTINGS.end
+            settings.start,
+            settings.end
+        );
+    }
+    Ok(())
+}
+
+/// The memory of DMA streams lies in SRAM 1 of the STM32H743: they reach no tightly coupled memory.
+fn streams_reach_their_memory(image: &Image) -> Result<()> {
+    const SRAM_1: Range<u64> = 0x3000_0000..0x3002_0000;
+    let (start, end) = (image.symbol("_dma_start")?, image.symbol("_dma_end")?);
+    ensure!(
+        SRAM_1.contains(&start) && end <= SRAM_1.end && end > start,
+        "{}: the streams' memory is at {start:#010x} to {end:#010x}, out of SRAM 1",
+        image.target
+    );
+    let file = object::File::parse(&*image.elf).context("the image is not an ELF file")?;
+    for name in ["PIN_WORDS", "TO_SEND", "RECEIVED"] {
+        let mangled = format!("{}{name}", name.len());
+        let mut places = file
+            .symbols()
+            .filter(|symbol| symbol.name().is_ok_and(|n| n.contains(&mangled)))
+            .map(|symbol| symbol.address())
+            .peekable();
+        ensure!(places.peek().is_some(), "{}: no `{name}`", image.target);
+        ensure!(
+            places.all(|place| (start..end).contains(&place)),
+            "{}: `{name}` is not where streams reach it",
+            image.target
         );
     }
     Ok(())

@@ -74,7 +74,7 @@ enum Verb {
     Emulate(Forwarded),
     /// Start the reference board's image in QEMU's model of a near relative of its chip
     BoardSmoke(Forwarded),
-    /// Run the reference board's image on a model of its chip that others wrote (the first time builds it, 4 to 10 min)
+    /// Run a board's image on a model of its chip that others wrote (the first time builds it, 4 to 10 min)
     BoardRun(Forwarded),
     /// Inject every fault into the emulated firmware, and report how it was found
     Faults(Forwarded),

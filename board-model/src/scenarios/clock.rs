@@ -1,17 +1,14 @@
 //! The 8 MHz of the debug probe, missing and lost.
 
-use std::path::Path;
-
 use anyhow::Result;
 
 use rigless::device::ResetCause;
 
-use crate::bench::Bench;
-use crate::board::ENABLE;
+use crate::bench::{Bench, Subject};
 use crate::report::Report;
-use crate::scenarios::{WATCHDOG_S, clear, jogging, resets, row_off};
+use crate::scenarios::{clear, jogging, resets, row_off};
 
-pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
     let mut bench = Bench::start_with_clock(image, None, 0);
     bench.run_for(2.0);
     report.equal(
@@ -20,7 +17,7 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
         bench.ticks().count,
     );
     let enabled = bench
-        .with(|world, board, _| board.level(ENABLE) || world.enables.iter().any(|change| change.1));
+        .with(|world, board, _| board.is_enabled() || world.enables.iter().any(|change| change.1));
     report.equal(
         "no 8 MHz at the start: enable line",
         "low",
@@ -31,12 +28,7 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
 
     let (mut bench, _client) = jogging(image, 20.0)?;
     let since = bench.now();
-    bench.with(|_, board, now| {
-        board.mcu.drive_clocks(now, |rcc, registers, context| {
-            rcc.fail_hse(registers, context)
-        });
-        board.mcu.rcc.attach_crystals(0, 0);
-    });
+    bench.with(|_, board, now| board.fail_hse(now));
     bench.run_for(0.05);
     // The chip model does not raise the NMI: see the scenario `nmi`.
     row_off(
@@ -44,23 +36,32 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
         report,
         "8 MHz lost in motion, without the NMI",
         since,
-        WATCHDOG_S[1],
+        image.board.watchdog_s[1],
     );
-    report.equal(
-        "8 MHz lost: reset by",
-        format!("{:?}", ResetCause::Model("IWDG")),
-        resets(&mut bench),
-    );
-    bench.ticks();
-    bench.run_for(1.0);
-    report.equal(
-        "8 MHz still away: control ticks in 1 s",
-        0,
-        bench.ticks().count,
-    );
+    if image.board.own_clock_feeds {
+        report.equal(
+            "8 MHz lost: resets, as the ticks of the chip's own clock feed the watchdog",
+            String::new(),
+            resets(&mut bench),
+        );
+        bench.run_for(1.0);
+    } else {
+        report.equal(
+            "8 MHz lost: reset by",
+            format!("{:?}", ResetCause::Model("IWDG")),
+            resets(&mut bench),
+        );
+        bench.ticks();
+        bench.run_for(1.0);
+        report.equal(
+            "8 MHz still away: control ticks in 1 s",
+            0,
+            bench.ticks().count,
+        );
+    }
     let (on, enables) = bench.with(|world, board, _| {
         (
-            board.level(ENABLE),
+            board.is_enabled(),
             world.enables.last().map(|change| change.1),
         )
     });

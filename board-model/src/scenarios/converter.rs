@@ -1,13 +1,10 @@
 //! The converter lost in mid-frame.
 
-use std::path::Path;
-
 use anyhow::{Result, ensure};
 use quadrant_link::message::Body;
 
 use crate::ad5754r;
-use crate::bench::Bench;
-use crate::board::ENABLE;
+use crate::bench::{Bench, Subject};
 use crate::link::Client;
 use crate::report::Report;
 use crate::scenarios::{clear, commissioned, jogging, row_fault, row_off, runs};
@@ -15,7 +12,7 @@ use crate::scenarios::{clear, commissioned, jogging, row_fault, row_off, runs};
 /// From the loss to the disabled amplifiers, s: a difference is found within four ticks (docs/board-nucleo-f446re.md), and a tick's computation.
 const FOUND_S: f64 = 500e-6;
 
-pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
     let mut bench = Bench::start(image, Some(&commissioned(image)?));
     ad5754r::lock(&bench.chip).power_off();
     ensure!(runs(&mut bench), "no control tick without a converter");
@@ -25,7 +22,7 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
         .err()
         .map(|error| format!("{error:#}"));
     bench.run_for(0.01);
-    let drives = bench.with(|_, board, _| board.level(ENABLE));
+    let drives = bench.with(|_, board, _| board.is_enabled());
     let answer = refusal.unwrap_or_else(|| "accepted".into());
     report.row(
         "no converter at the start: `enable`",
@@ -70,7 +67,7 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
     report.equal(
         "`enable` with a converter that was not set up",
         false,
-        bench.with(|_, board, _| board.level(ENABLE)),
+        bench.with(|_, board, _| board.is_enabled()),
     );
     Ok(())
 }

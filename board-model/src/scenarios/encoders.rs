@@ -1,9 +1,8 @@
 //! Encoders by edges on the pins.
 
-use std::path::Path;
-
 use anyhow::Result;
 
+use crate::bench::Subject;
 use crate::link::Client;
 use crate::report::Report;
 use crate::scenarios::started;
@@ -11,10 +10,8 @@ use crate::stage::{COUNT_MM, INDEX_COUNTS};
 
 /// Speed, counts/s.
 const RATE: f64 = 200_000.0;
-/// Mask of each timer's counter.
-const MASKS: [u32; 3] = [u32::MAX, 0xFFFF, 0xFFFF];
 
-pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
     let mut bench = started(image, None)?;
     let mut client = Client::open(&mut bench)?;
     let before = client.status(&mut bench)?;
@@ -26,7 +23,7 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
     let shown = bench.with(|world, _, _| world.shown);
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
         let (count, captured) = bench.counter(axis);
-        let mask = MASKS[axis];
+        let mask = image.board.encoders[axis].mask;
         let text = |count: i64| (count as u32 & mask).to_string();
         report.equal(
             &format!("{name}: counter after {} edges", shown[axis].abs()),
@@ -52,9 +49,9 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
             (moved - shown[axis] as f64 * COUNT_MM).abs() < 1e-9,
         );
     }
-    // 8 samples at 180/16 MHz (RM0390, IC1F = 1100): 711 ns; for the timers of APB 1 at 90/8 MHz the same.
+    let [rejected, passed] = image.board.filtered_ns;
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        for (ns, counts) in [(700, 0), (720, 1)] {
+        for (ns, counts) in [(rejected, 0), (passed, 1)] {
             let (before, _) = bench.counter(axis);
             bench.with(move |world, board, now| world.glitch(board, now, axis, 0, ns));
             // Within the pulse, behind the filter.

@@ -1,18 +1,14 @@
 //! Faults of the processor.
 
-use std::path::Path;
-
 use anyhow::{Result, ensure};
 use quadrant_link::message::Body;
 use rigless::device::ResetCause;
 use rigless::soc::Width;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, Subject};
 use crate::link::Client;
 use crate::report::Report;
-use crate::scenarios::{
-    NEXT_TICK_S, WATCHDOG_S, clear, jogging, row_fault, row_off, row_started, runs,
-};
+use crate::scenarios::{NEXT_TICK_S, clear, jogging, row_fault, row_off, row_started, runs};
 
 /// TIM7_SR, which every control tick writes.
 const TICK_STATUS: u64 = 0x4000_1410;
@@ -22,8 +18,6 @@ const TASK: &str = "DISPATCHER_1";
 const TASK_PERIOD_S: f64 = 1e-3;
 /// `push {r4-r7, lr}` and a branch to it.
 const RECURSION: [u32; 1] = [0xE7FD_B5F0];
-/// Addresses without memory below the stack, which is at the bottom of RAM.
-const BELOW_STACK: std::ops::Range<u64> = 0x1FFF_8000..0x2000_0000;
 /// Writes NMIPENDSET, bit 31 of ICSR (0xE000ED04), and loops: movw, movt, mov.w, str, b.
 const PEND_NMI: [u32; 4] = [0x5004_F64E, 0x0000_F2CE, 0x4100_F04F, 0xE7FE_6001];
 
@@ -42,15 +36,12 @@ fn aftermath(
     bench.run_for(0.03);
     let reset = bench.with(|world, _, _| world.resets.first().copied());
     let measured = reset.map_or(0.0, |reset| (reset.0 - fed) as f64 * 1e-9);
+    let [least, most] = bench.wiring.watchdog_s;
     report.row(
         "watchdog after its last feed",
-        format!(
-            "{:.1} to {:.1} ms",
-            WATCHDOG_S[0] * 1e3,
-            WATCHDOG_S[1] * 1e3
-        ),
+        format!("{:.1} to {:.1} ms", least * 1e3, most * 1e3),
         format!("{:.2} ms", measured * 1e3),
-        (WATCHDOG_S[0]..=WATCHDOG_S[1]).contains(&measured),
+        (least..=most).contains(&measured),
     );
     report.equal(
         "source of the reset",
@@ -67,7 +58,7 @@ fn aftermath(
     row_fault(bench, &mut client, report, "fault after the reset", fault)?;
     let refused = client.ask(bench, Body::Enable).is_err() || {
         bench.run_for(0.01);
-        !bench.with(|_, board, _| board.level(crate::board::ENABLE))
+        !bench.with(|_, board, _| board.is_enabled())
     };
     report.equal(
         "`enable` before the fault is reset is refused",
@@ -81,12 +72,12 @@ fn aftermath(
     report.equal(
         "enabled after `reset`",
         true,
-        bench.with(|_, board, _| board.level(crate::board::ENABLE)),
+        bench.with(|_, board, _| board.is_enabled()),
     );
     Ok(())
 }
 
-pub(super) fn hard_fault(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn hard_fault(image: &Subject, report: &mut Report) -> Result<()> {
     let (mut bench, _) = jogging(image, 20.0)?;
     let since = bench.now();
     bench.with_session(|_, session, _, _| session.fail_next(TICK_STATUS, TICK_STATUS + 4));
@@ -95,9 +86,9 @@ pub(super) fn hard_fault(image: &Path, report: &mut Report) -> Result<()> {
 
 /// Replaces the first instructions of a task, lets it run, and puts them back for the next start. Returns the instant of the
 /// replacement.
-fn run_instead(bench: &mut Bench, image: &Path, code: &'static [u32]) -> Result<u64> {
+fn run_instead(bench: &mut Bench, image: &Subject, code: &'static [u32]) -> Result<u64> {
     let since = bench.now();
-    let elf = std::fs::read(image)?;
+    let elf = std::fs::read(&image.image)?;
     let symbols = rigless::symbols::Symbols::read(&elf, |address| address & !1)?;
     let task = symbols.get(TASK)? & !1;
     let mut old = Vec::new();
@@ -115,10 +106,11 @@ fn run_instead(bench: &mut Bench, image: &Path, code: &'static [u32]) -> Result<
     Ok(since)
 }
 
-pub(super) fn stack_overflow(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn stack_overflow(image: &Subject, report: &mut Report) -> Result<()> {
     let (mut bench, _) = jogging(image, 20.0)?;
     // The model answers where there is no memory; the chip's first store there is a bus error.
-    bench.with_session(|_, session, _, _| session.fail_next(BELOW_STACK.start, BELOW_STACK.end));
+    let below = image.board.below_stack.clone();
+    bench.with_session(move |_, session, _, _| session.fail_next(below.start, below.end));
     let since = run_instead(&mut bench, image, &RECURSION)?;
     let log = bench.log();
     let says = log.iter().find(|line| line.contains("the stack is full"));
@@ -137,7 +129,7 @@ pub(super) fn stack_overflow(image: &Path, report: &mut Report) -> Result<()> {
     )
 }
 
-pub(super) fn nmi(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn nmi(image: &Subject, report: &mut Report) -> Result<()> {
     let (mut bench, _) = jogging(image, 20.0)?;
     let since = run_instead(&mut bench, image, &PEND_NMI)?;
     aftermath(

@@ -1,11 +1,9 @@
 //! A link without a pause.
 
-use std::path::Path;
-
 use anyhow::Result;
 use quadrant_link::message::Body;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, Subject};
 use crate::report::Report;
 use crate::scenarios::{jogging, row_off};
 
@@ -16,7 +14,7 @@ const BYTES_PER_S: f64 = 92_160.0;
 /// Duration of each flood, s: less than the half second after which a silent host stops the machine.
 const FLOOD_S: f64 = 0.3;
 
-pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
     let (mut bench, mut client) = jogging(image, 10.0)?;
     let before = client.status(&mut bench)?;
     bench.ticks();

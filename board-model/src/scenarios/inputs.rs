@@ -1,35 +1,34 @@
 //! Safety inputs of a moving machine.
 
-use std::path::Path;
-
 use anyhow::Result;
 use quadrant_link::message::{AxisName, Body};
 
-use crate::bench::Bench;
-use crate::board::{At, EMERGENCY_STOP, FAULTS, LIMITS, READY};
+use crate::bench::{Bench, Subject};
 use crate::link::Client;
 use crate::report::Report;
 use crate::scenarios::{NEXT_TICK_S, driving, enable, row_fault, row_off};
+use crate::wiring::{At, Wiring};
 
 /// Velocity of the jog, mm/s.
 const VELOCITY: f64 = 20.0;
 /// A controlled stop at most, s: 105 ms of braking with these settings, 200 ticks at rest, 50 ms in reserve (docs/safety.md).
 const STOP_S: f64 = 0.155;
-/// Supply below the lowest threshold of the supply monitor that the board's page names, mV.
-const LOW_MV: u32 = 2840;
 
 /// The inputs of which one broken wire, or one active contact, switches off at once.
-const OFF: [(&str, At, &str); 5] = [
-    ("emergency stop", EMERGENCY_STOP, "4 emergency-stop"),
-    ("amplifiers ready", READY, "14 amplifier-fault x"),
-    ("amplifier fault x", FAULTS[0], "14 amplifier-fault x"),
-    ("amplifier fault y", FAULTS[1], "14 amplifier-fault y"),
-    ("amplifier fault z", FAULTS[2], "14 amplifier-fault z"),
-];
+fn off(wiring: &Wiring) -> [(&'static str, At, &'static str); 5] {
+    let [x, y, z] = wiring.faults;
+    [
+        ("emergency stop", wiring.emergency_stop, "4 emergency-stop"),
+        ("amplifiers ready", wiring.ready, "14 amplifier-fault x"),
+        ("amplifier fault x", x, "14 amplifier-fault x"),
+        ("amplifier fault y", y, "14 amplifier-fault y"),
+        ("amplifier fault z", z, "14 amplifier-fault z"),
+    ]
+}
 
-pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
     let (mut bench, mut client) = driving(image)?;
-    for (name, at, fault) in OFF {
+    for (name, at, fault) in off(image.board) {
         jog(&mut bench, &mut client, AxisName::X, VELOCITY)?;
         let since = bench.now();
         bench.drive(at, true);
@@ -52,7 +51,7 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
             .ask(&mut bench, Body::ResetFault)
             .and_then(|_| client.ask(&mut bench, Body::Enable));
         bench.run_for(0.005);
-        let drives = bench.with(|_, board, _| board.level(crate::board::ENABLE));
+        let drives = bench.with(|_, board, _| board.is_enabled());
         report.row(
             &format!("{name} open: `enable`"),
             "refused",
@@ -64,12 +63,13 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
     }
     jog(&mut bench, &mut client, AxisName::X, VELOCITY)?;
     let since = bench.now();
-    bench.with(|_, board, _| board.mcu.set_supply(LOW_MV));
+    let low_mv = image.board.low_mv;
+    bench.with(move |_, board, _| board.set_supply(low_mv));
     bench.run_for(0.001);
     row_off(
         &mut bench,
         report,
-        &format!("supply at {LOW_MV} mV"),
+        &format!("supply at {low_mv} mV"),
         since,
         NEXT_TICK_S,
     );
@@ -80,11 +80,11 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
         "low supply: fault",
         "14 amplifier-fault x",
     )?;
-    bench.with(|_, board, _| board.mcu.set_supply(3300));
+    bench.with(|_, board, _| board.set_supply(3300));
     bench.run_for(0.01);
     again(&mut bench, &mut client)?;
 
-    for (index, at) in LIMITS.into_iter().enumerate() {
+    for (index, at) in image.board.limits.into_iter().enumerate() {
         let (axis, positive) = (AxisName::ALL[index / 2], index % 2 == 1);
         let (sign, code) = if positive {
             (1.0, "6 positive-limit-switch")

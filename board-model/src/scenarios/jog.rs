@@ -1,18 +1,17 @@
 //! A jog of three axes, through edges and frames.
 
-use std::path::Path;
-
 use anyhow::Result;
 use quadrant_link::message::{AxisName, Body, MachineState};
 
+use crate::bench::Subject;
 use crate::report::Report;
-use crate::scenarios::{WATCHDOG_S, driving, row_off};
+use crate::scenarios::{driving, row_off};
 use crate::stage::COUNT_MM;
 
 /// Velocities of x, y, z, mm/s.
 const VELOCITIES: [f64; 3] = [20.0, -15.0, 8.0];
 
-pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
     let (mut bench, mut client) = driving(image)?;
     bench.ticks();
     bench.with(|world, _, _| world.feeds.1 = 0);
@@ -87,7 +86,7 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
     report.within(
         "longest time between two feeds of the watchdog",
         0.0,
-        WATCHDOG_S[0] * 1e3,
+        image.board.watchdog_s[0] * 1e3,
         longest,
         "ms",
     );

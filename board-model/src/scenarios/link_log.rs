@@ -1,11 +1,9 @@
 //! The log over the link.
 
-use std::path::Path;
-
 use anyhow::{Result, anyhow};
 use quadrant_link::message::{Body, LogPage, Reply};
 
-use crate::bench::Bench;
+use crate::bench::{Bench, Subject};
 use crate::link::Client;
 use crate::report::Report;
 use crate::scenarios::{commissioned, enable, started};
@@ -13,7 +11,7 @@ use crate::scenarios::{commissioned, enable, started};
 /// Bytes that the server keeps (docs/log.md).
 const KEPT: u32 = 2048;
 
-pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
     let mut bench = started(image, Some(&commissioned(image)?))?;
     bench.with(|world, _, _| world.log.is_read = false);
     bench.run_for(0.02);
@@ -24,8 +22,18 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
     let first = bench.log().len();
     let next = read(&mut bench, &mut client, 0)?;
     let lines = bench.log().split_off(first);
-    row(report, "the start, which came before a host asked", &lines, "started by software");
-    row(report, "the settings that act", &lines, "settings number 1 from flash");
+    row(
+        report,
+        "the start, which came before a host asked",
+        &lines,
+        "started by software",
+    );
+    row(
+        report,
+        "the settings that act",
+        &lines,
+        "settings number 1 from flash",
+    );
 
     enable(&mut bench, &mut client)?;
     client.ask(&mut bench, Body::Disable)?;
@@ -64,7 +72,11 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
         format!("{shortest} to {longest}"),
     );
     report.equal("overruns", 0, client.status(&mut bench)?.overruns);
-    let damaged = bench.log().iter().filter(|line| line.contains("damaged")).count();
+    let damaged = bench
+        .log()
+        .iter()
+        .filter(|line| line.contains("damaged"))
+        .count();
     report.equal("damaged lines", 0, damaged);
     report.none("complaints of the models", &bench.complaints());
     Ok(())

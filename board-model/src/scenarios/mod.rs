@@ -3,6 +3,7 @@
 mod clock;
 mod converter;
 mod encoders;
+mod fastest;
 mod faults;
 mod flood;
 mod inputs;
@@ -13,7 +14,6 @@ mod start;
 mod store;
 mod words;
 
-use std::path::Path;
 use std::sync::OnceLock;
 
 use anyhow::{Result, anyhow, ensure};
@@ -21,7 +21,7 @@ use quadrant_link::message::{AxisName, Body, MachineState, Reply};
 use quadrant_settings::StageSettings;
 
 use crate::ad5754r;
-use crate::bench::Bench;
+use crate::bench::{Bench, Subject};
 use crate::link::Client;
 use crate::report::Report;
 
@@ -32,7 +32,7 @@ pub struct Scenario {
     /// Subject.
     pub about: &'static str,
     /// Runs it on an image.
-    pub run: fn(&Path, &mut Report) -> Result<()>,
+    pub run: fn(&Subject, &mut Report) -> Result<()>,
 }
 
 macro_rules! scenarios {
@@ -58,22 +58,20 @@ pub const SCENARIOS: &[Scenario] = scenarios! {
     "flood", "noise and requests without a pause on the link", flood::run;
     "link-log", "the log over the link, while no probe reads it", link_log::run;
     "clock", "8 MHz missing at the start, and lost in motion", clock::run;
+    "fastest", "a jog at the highest control rate that the board is up to", fastest::run;
     "words", "every converter word of 10 s of motion beside the reference model's", words::run;
 };
 
-/// Longest start, s (docs/board-nucleo-f446re.md: 1.8 s with stored settings).
-const START_S: f64 = 2.0;
 /// From the cause of a fault to the disabled amplifiers, at most, s: the next tick, and its computation.
 const NEXT_TICK_S: f64 = 200e-6;
-/// The watchdog's time after its last feed, s (docs/board-nucleo-f446re.md).
-const WATCHDOG_S: [f64; 2] = [6.8e-3, 18.8e-3];
 
 /// Switches the board on and waits until the control ticks run.
-fn started(image: &Path, settings: Option<&[u8]>) -> Result<Bench> {
+fn started(image: &Subject, settings: Option<&[u8]>) -> Result<Bench> {
     let mut bench = Bench::start(image, settings);
     ensure!(
         runs(&mut bench),
-        "no control tick within {START_S} s; log: {:#?}",
+        "no control tick within {} s; log: {:#?}",
+        image.board.start_s,
         bench.log()
     );
     Ok(bench)
@@ -81,13 +79,13 @@ fn started(image: &Path, settings: Option<&[u8]>) -> Result<Bench> {
 
 /// Waits until control ticks run.
 fn runs(bench: &mut Bench) -> bool {
-    bench.run_while(START_S, 0.005, |bench| {
+    bench.run_while(bench.wiring.start_s, 0.005, |bench| {
         bench.with(|world, _, _| world.ticks.count > 20)
     })
 }
 
 /// Contents of the settings' sectors after the simulated stage's settings were stored by the link.
-fn commissioned(image: &Path) -> Result<Vec<u8>> {
+fn commissioned(image: &Subject) -> Result<Vec<u8>> {
     static STORED: OnceLock<Vec<u8>> = OnceLock::new();
     if let Some(stored) = STORED.get() {
         return Ok(stored.clone());
@@ -104,7 +102,7 @@ fn commissioned(image: &Path) -> Result<Vec<u8>> {
 }
 
 /// A commissioned board whose outputs drive the three axes.
-fn driving(image: &Path) -> Result<(Bench, Client)> {
+fn driving(image: &Subject) -> Result<(Bench, Client)> {
     let mut bench = started(image, Some(&commissioned(image)?))?;
     bench.with(|world, _, _| world.plant = true);
     let mut client = Client::open(&mut bench)?;
@@ -167,7 +165,7 @@ fn row_fault(
 }
 
 /// A machine that jogs x.
-fn jogging(image: &Path, velocity_mm_s: f64) -> Result<(Bench, Client)> {
+fn jogging(image: &Subject, velocity_mm_s: f64) -> Result<(Bench, Client)> {
     let (mut bench, mut client) = driving(image)?;
     client.ask(
         &mut bench,

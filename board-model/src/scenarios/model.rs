@@ -1,10 +1,9 @@
 //! The converter's model by itself: "no complaint" means something only if it complains.
 
-use std::path::Path;
-
 use anyhow::Result;
 
 use crate::ad5754r::{Ad5754r, Wire};
+use crate::bench::Subject;
 use crate::report::Report;
 
 /// A write of a code to channel A, and one of the power register.
@@ -79,7 +78,7 @@ fn complaints(times: Times) -> usize {
     chip.complaints.len()
 }
 
-pub(super) fn run(_: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn run(_: &Subject, report: &mut Report) -> Result<()> {
     report.equal("all times at their least: complaints", 0, complaints(KEPT));
     let read = Times {
         first: ASK_A,

@@ -1,22 +1,17 @@
 //! The start with blank settings.
 
-use std::path::Path;
-
 use anyhow::Result;
 
 use crate::ad5754r::{self, RANGE_10_V, SCLK_NS, SDO_NS};
+use crate::bench::Subject;
 use crate::link::Client;
 use crate::report::Report;
 use crate::scenarios::started;
 
-/// SPI2_CR1.
-const SPI_CONTROL: u64 = 0x4000_3800;
-/// Beginning of the first frame to /LDAC at most, ns (docs/board-nucleo-f446re.md, "Converter").
-const LDAC_NS: u64 = 7_800;
 /// Time from a clock edge to a read SDO: 40 ns of the chip, and 10 ns for wire and input.
 const READ_NS: u64 = SDO_NS + 10;
 
-pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
     let mut bench = started(image, None)?;
     let mhz = bench
         .clocks()
@@ -24,7 +19,7 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
         .join("/");
     report.equal(
         "SYSCLK/HCLK/PCLK1/PCLK2/timers 1/timers 2, MHz",
-        "180/180/45/90/90/180".into(),
+        image.board.clocks_mhz.into(),
         mhz,
     );
 
@@ -63,12 +58,12 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
         "0 0 0".into(),
         ad5754r.codes().map(|c| c.to_string()).join(" "),
     );
-    let ldac = ad5754r.longest_load;
+    let (ldac, load_ns) = (ad5754r.longest_load, image.board.load_ns);
     report.row(
         "first frame's beginning to /LDAC",
-        format!("at most {LDAC_NS} ns"),
+        format!("at most {load_ns} ns"),
         format!("{ldac} ns"),
-        (1..=LDAC_NS).contains(&ldac),
+        (1..=load_ns).contains(&ldac),
     );
     drop(ad5754r);
 
@@ -77,15 +72,18 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
     let mut takes_at_falling_edge = true;
     for _ in 0..800 {
         bench.run_for(0.3e-6);
-        let control = bench.with(|_, board, now| board.peek(now, SPI_CONTROL));
+        let (divider, place) = image.board.spi_divider;
+        let (mode, polarity, phase) = image.board.spi_mode;
+        let (divider, mode) =
+            bench.with(move |_, board, now| (board.peek(now, divider), board.peek(now, mode)));
         let last_tick = bench.with(|world, _, _| world.ticks.last_ns);
         let Some(begun) = ad5754r::lock(&chip).frame_began() else {
             continue;
         };
         // CPOL and CPHA differ.
-        takes_at_falling_edge &= (control & 1) != (control >> 1 & 1);
-        let reads = begun > last_tick && begun - last_tick < 7_000;
-        let period = 1_000_000_000 * (2 << (control >> 3 & 7)) / 45_000_000;
+        takes_at_falling_edge &= (mode >> polarity & 1) != (mode >> phase & 1);
+        let reads = begun > last_tick && begun - last_tick < image.board.read_within_ns;
+        let period = 1_000_000_000 * (2 << (divider >> place & 7)) / image.board.spi_hz;
         fastest[usize::from(reads)] = period.min(fastest[usize::from(reads)]);
     }
     report.row(

@@ -1,27 +1,19 @@
 //! Settings in flash.
 
-use std::path::Path;
-
 use anyhow::{Result, ensure};
 use quadrant_link::message::{Body, SettingsRequest};
 use quadrant_settings::StageSettings;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, Subject};
 use crate::link::{Client, provenance};
 use crate::report::Report;
-use crate::scenarios::{WATCHDOG_S, commissioned, resets, row_fault, row_started, runs, started};
+use crate::scenarios::{commissioned, resets, row_fault, row_started, runs, started};
 use crate::stage::COUNT_MM;
 
-/// FLASH_CR.
-const FLASH_CONTROL: u64 = 0x4002_3C10;
-/// FLASH_CR: start of an erasure.
-const START: u64 = 1 << 16;
 /// Longest store, s.
 const STORE_S: f64 = 5.0;
-/// Size of a sector of settings.
-const SECTOR: usize = 0x4000;
 
-pub(super) fn reboot(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn reboot(image: &Subject, report: &mut Report) -> Result<()> {
     let flash = commissioned(image)?;
     let mut bench = started(image, Some(&flash))?;
     let mut client = Client::open(&mut bench)?;
@@ -53,24 +45,27 @@ pub(super) fn reboot(image: &Path, report: &mut Report) -> Result<()> {
     Ok(())
 }
 
-/// The watchdog's shortest time, ms.
-const WATCHDOG_MS: f64 = WATCHDOG_S[0] * 1e3;
 /// Speeds at which hands turn the encoders, counts/s: counters of 16 bits pass their end every 0.3 s.
 const TURNED: [f64; 3] = [150_000.0, -200_000.0, 180_000.0];
 
-pub(super) fn erase(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn erase(image: &Subject, report: &mut Report) -> Result<()> {
     let mut bench = started(image, Some(&commissioned(image)?))?;
     let mut client = Client::open(&mut bench)?;
-    bench.with(|world, _, _| world.trace = Some(FLASH_CONTROL..FLASH_CONTROL + 4));
+    trace_flash(&mut bench);
     let before = client.status(&mut bench)?;
     let mut erased = false;
-    for number in 1..8 {
+    let most = stores(image);
+    for number in 1..=most {
         if store_until_erasure(&mut bench, &mut client, &format!("set {number}"))?.is_some() {
             erased = true;
             break;
         }
     }
-    report.equal("a sector is erased by one of seven stores", true, erased);
+    report.equal(
+        &format!("a sector is erased by one of {most} stores"),
+        true,
+        erased,
+    );
     bench.with(|world, _, _| world.feeds.1 = 0);
     bench.spin(TURNED);
     let answered = bench.run_while(STORE_S, 0.001, |bench| client.take(bench).is_some());
@@ -81,7 +76,7 @@ pub(super) fn erase(image: &Path, report: &mut Report) -> Result<()> {
     report.within(
         "longest time between two feeds of the watchdog",
         0.0,
-        WATCHDOG_MS,
+        image.board.watchdog_s[0] * 1e3,
         longest as f64 * 1e-6,
         "ms",
     );
@@ -102,30 +97,31 @@ pub(super) fn erase(image: &Path, report: &mut Report) -> Result<()> {
     Ok(())
 }
 
-/// A byte of the sector by its offset and what was there.
-type Left = fn(usize, u8) -> u8;
+/// A byte of the sector by the sector's size, its offset and what was there.
+type Left = fn(usize, usize, u8) -> u8;
 
 /// State of the sector that a cut erasure leaves.
 const LEFT: [(&str, Left); 4] = [
-    ("as it was", |_, old| old),
-    ("erased in its lower half", |at, old| {
-        if at < SECTOR / 2 { 0xFF } else { old }
+    ("as it was", |_, _, old| old),
+    ("erased in its lower half", |size, at, old| {
+        if at < size / 2 { 0xFF } else { old }
     }),
-    ("erased in its upper half", |at, old| {
-        if at < SECTOR / 2 { old } else { 0xFF }
+    ("erased in its upper half", |size, at, old| {
+        if at < size / 2 { old } else { 0xFF }
     }),
-    ("erased in some of its bits", |at, old| {
+    ("erased in some of its bits", |_, at, old| {
         old | [0x5A, 0xC3, 0x3C][at % 3]
     }),
 ];
 
-pub(super) fn power_cut(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn power_cut(image: &Subject, report: &mut Report) -> Result<()> {
     let mut bench = started(image, Some(&commissioned(image)?))?;
     let mut client = Client::open(&mut bench)?;
-    bench.with(|world, _, _| world.trace = Some(FLASH_CONTROL..FLASH_CONTROL + 4));
+    trace_flash(&mut bench);
     let mut origin = String::from("board-run");
     let mut erased = None;
-    for number in 1..8 {
+    let most = stores(image);
+    for number in 1..=most {
         let next = format!("set {number}");
         let sector = store_until_erasure(&mut bench, &mut client, &next)?;
         if let Some(sector) = sector {
@@ -137,25 +133,27 @@ pub(super) fn power_cut(image: &Path, report: &mut Report) -> Result<()> {
     let Some(sector) = erased else {
         report.row(
             "stores until a sector is erased",
-            "at most 7",
+            format!("at most {most}"),
             "none",
             false,
         );
         return Ok(());
     };
+    let (.., lowest) = image.board.flash_control;
     report.row(
         "sector erased by a store",
-        "1 or 2",
+        format!("{lowest} or {}", lowest + 1),
         sector,
-        (1..=2).contains(&sector),
+        (lowest..=lowest + 1).contains(&sector),
     );
     let flash = bench.settings_flash();
     drop(bench);
-    let first = (sector as usize - 1) * SECTOR;
+    let size = image.board.settings.1 as usize;
+    let first = (sector - lowest) as usize * size;
     for (how, left) in LEFT {
         let mut flash = flash.clone();
-        for (at, byte) in flash[first..first + SECTOR].iter_mut().enumerate() {
-            *byte = left(at, *byte);
+        for (at, byte) in flash[first..first + size].iter_mut().enumerate() {
+            *byte = left(size, at, *byte);
         }
         let mut bench = started(image, Some(&flash))?;
         let mut client = Client::open(&mut bench)?;
@@ -181,6 +179,17 @@ pub(super) fn power_cut(image: &Path, report: &mut Report) -> Result<()> {
     Ok(())
 }
 
+/// Stores by which a sector is full: a set takes more than 2 KiB.
+fn stores(image: &Subject) -> u64 {
+    image.board.settings.1 / 2048 - 1
+}
+
+/// Keeps what is written to the flash's control register.
+fn trace_flash(bench: &mut Bench) {
+    let (control, ..) = bench.wiring.flash_control;
+    bench.with(move |world, _, _| world.trace = Some(control..control + 4));
+}
+
 /// Stores; returns the sector whose erasure has begun 100 ms before the end of the call, or none if the set is stored.
 fn store_until_erasure(
     bench: &mut Bench,
@@ -188,13 +197,14 @@ fn store_until_erasure(
     origin: &str,
 ) -> Result<Option<u64>> {
     bench.with(|world, _, _| world.traced.clear());
+    let (_, start, number, _) = bench.wiring.flash_control;
     let begun = |bench: &mut Bench| {
-        bench.with(|world, _, _| {
+        bench.with(move |world, _, _| {
             world
                 .traced
                 .iter()
-                .find(|write| write.2 & START != 0)
-                .map(|write| write.2 >> 3 & 0xF)
+                .find(|write| write.2 >> start & 1 != 0)
+                .map(|write| write.2 >> number & 7)
         })
     };
     client.begin(

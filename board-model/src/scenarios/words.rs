@@ -4,8 +4,6 @@
 //! the first one on. The ticks in which the orders reach the law are not on any wire. That of `enable` shows at the enable line, that of
 //! `run` is the one with which the first words agree; all others then must.
 
-use std::path::Path;
-
 use anyhow::{Result, anyhow, ensure};
 use quadrant_law::command::Command;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
@@ -16,7 +14,7 @@ use quadrant_sim::benchmark_job::circle_and_sine;
 use quadrant_sim::law_machine::TickInput;
 
 use crate::ad5754r;
-use crate::bench::TickRecord;
+use crate::bench::{Subject, TickRecord};
 use crate::link::Client;
 use crate::report::Report;
 use crate::scenarios::{commissioned, enable, started};
@@ -70,7 +68,7 @@ impl Reference {
     }
 }
 
-pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
     let job = circle_and_sine(LEAD_S);
     let reference = Reference {
         stage: job.stage.build().map_err(|error| anyhow!("{error}"))?,

@@ -57,11 +57,13 @@ impl Damage {
     }
 }
 
-/// Sectors, two unless there are to be more, written by words of four bytes, each word once between erasures.
+/// Sectors, two unless there are to be more, written by words, each word once between erasures. Words of more than eight bytes have a
+/// check sum: one that a cut left in between reads as zeros.
 #[derive(Clone, Debug)]
-pub struct Flash {
+pub struct WordFlash<const WORD: usize> {
     pub bytes: Vec<u8>,
     programmed: Vec<bool>,
+    torn: Vec<bool>,
     /// Words written and sectors erased so far.
     pub operations: u64,
     /// Erasures of each sector.
@@ -76,7 +78,10 @@ pub struct Flash {
     pub outputs_on: bool,
 }
 
-impl Default for Flash {
+/// A flash as the reference board's, with words of four bytes.
+pub type Flash = WordFlash<4>;
+
+impl<const WORD: usize> Default for WordFlash<WORD> {
     fn default() -> Self {
         Self::of_sectors(2)
     }
@@ -102,12 +107,13 @@ impl NorFlashError for FlashError {
     }
 }
 
-impl Flash {
+impl<const WORD: usize> WordFlash<WORD> {
     /// A blank flash of so many sectors.
     pub fn of_sectors(count: usize) -> Self {
         Self {
             bytes: vec![0xFF; count * SECTOR],
-            programmed: vec![false; count * SECTOR / 4],
+            programmed: vec![false; count * SECTOR / WORD],
+            torn: vec![false; count * SECTOR / WORD],
             operations: 0,
             erasures: vec![0; count],
             cut: None,
@@ -139,16 +145,24 @@ impl Flash {
         self.operations += 1;
         if !self.worn.as_ref().is_some_and(|worn| worn.contains(&at)) {
             damage.apply(&mut self.bytes[at..at + to.len()], to);
+            let words = &mut self.torn[at / WORD..(at + to.len()) / WORD];
+            match damage {
+                Damage::All => words.fill(false),
+                Damage::SomeBits(_) => words.fill(WORD > 8),
+                // Half a sector is of whole words, half a word is not.
+                Damage::LowHalf | Damage::HighHalf if words.len() == 1 => words.fill(WORD > 8),
+                Damage::LowHalf | Damage::HighHalf | Damage::Nothing => {}
+            }
         }
         if cut { Err(FlashError::Off) } else { Ok(()) }
     }
 }
 
-impl ErrorType for Flash {
+impl<const WORD: usize> ErrorType for WordFlash<WORD> {
     type Error = FlashError;
 }
 
-impl ReadNorFlash for Flash {
+impl<const WORD: usize> ReadNorFlash for WordFlash<WORD> {
     const READ_SIZE: usize = 1;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
@@ -157,7 +171,13 @@ impl ReadNorFlash for Flash {
             return Err(FlashError::Off);
         }
         let at = offset as usize;
-        bytes.copy_from_slice(&self.bytes[at..at + bytes.len()]);
+        for (place, byte) in (at..).zip(bytes) {
+            *byte = if self.torn[place / WORD] {
+                0
+            } else {
+                self.bytes[place]
+            };
+        }
         Ok(())
     }
 
@@ -166,21 +186,21 @@ impl ReadNorFlash for Flash {
     }
 }
 
-impl SettingsFlash for Flash {
+impl<const WORD: usize> SettingsFlash for WordFlash<WORD> {
     fn outputs_are_off(&self) -> bool {
         !self.outputs_on
     }
 }
 
-impl NorFlash for Flash {
-    const WRITE_SIZE: usize = 4;
+impl<const WORD: usize> NorFlash for WordFlash<WORD> {
+    const WRITE_SIZE: usize = WORD;
     const ERASE_SIZE: usize = SECTOR;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
         check_erase(self, from, to).map_err(FlashError::Refused)?;
         for start in (from as usize..to as usize).step_by(SECTOR) {
             self.operate(start, &[0xFF; SECTOR])?;
-            self.programmed[start / 4..(start + SECTOR) / 4].fill(false);
+            self.programmed[start / WORD..(start + SECTOR) / WORD].fill(false);
             self.erasures[start / SECTOR] += 1;
         }
         Ok(())
@@ -188,16 +208,16 @@ impl NorFlash for Flash {
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
         check_write(self, offset, bytes.len()).map_err(FlashError::Refused)?;
-        for (index, word) in bytes.chunks_exact(4).enumerate() {
-            let at = offset as usize + 4 * index;
+        for (index, word) in bytes.chunks_exact(WORD).enumerate() {
+            let at = offset as usize + WORD * index;
             let refuses = |words: &std::ops::Range<usize>| words.contains(&at);
-            if self.programmed[at / 4] || self.refusing.as_ref().is_some_and(refuses) {
+            if self.programmed[at / WORD] || self.refusing.as_ref().is_some_and(refuses) {
                 return Err(FlashError::WrittenTwice);
             }
             // A cut before the operation leaves the word as it is.
-            self.programmed[at / 4] = self.cut != Some((self.operations, Damage::Nothing));
+            self.programmed[at / WORD] = self.cut != Some((self.operations, Damage::Nothing));
             // Writing can only clear bits.
-            let old = &self.bytes[at..at + 4];
+            let old = &self.bytes[at..at + WORD];
             let to: Vec<u8> = old.iter().zip(word).map(|(old, new)| old & new).collect();
             self.operate(at, &to)?;
         }

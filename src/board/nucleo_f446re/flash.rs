@@ -8,15 +8,15 @@
 use core::ptr::{read_volatile, write_volatile};
 
 use embedded_storage::nor_flash::{
-    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
-    check_erase, check_read, check_write,
+    ErrorType, MultiwriteNorFlash, NorFlash, ReadNorFlash, check_erase, check_read, check_write,
 };
 use quadrant::hal;
-use stm32f4xx_hal::pac::{FLASH, GPIOC, IWDG};
+use stm32f4xx_hal::pac::{FLASH, IWDG};
 
+use super::chip::enable_line_is_low;
 use super::encoders::keep_up;
-use super::pins::ENABLE;
-use super::watchdog::KEY_RELOAD;
+use crate::board::stm32::settings_flash::FlashError;
+use crate::board::stm32::watchdog::KEY_RELOAD;
 
 /// Address of the two sectors; the linker's map leaves them out.
 const START: u32 = 0x0800_4000;
@@ -47,51 +47,6 @@ const DATA_CACHE_RESET: u32 = 1 << 12;
 const ERASE_LOOKS: u32 = 9_000_000;
 /// The same for a word: at least 1 ms, and the processor waits by itself, as it fetches from the same flash.
 const PROGRAM_LOOKS: u32 = 20_000;
-
-/// The flash did not carry out its command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum FlashError {
-    /// Outside of the two sectors.
-    OutOfBounds,
-    /// Not at a word, or not at a sector.
-    NotAligned,
-    /// The controller's error flags (FLASH_SR).
-    Controller(u32),
-    /// It did not end in time.
-    Stuck,
-    /// It reads back differently: the cells are worn.
-    Verify,
-    /// The amplifiers' enable line is high.
-    OutputsOn,
-}
-
-impl NorFlashError for FlashError {
-    fn kind(&self) -> NorFlashErrorKind {
-        match self {
-            Self::OutOfBounds => NorFlashErrorKind::OutOfBounds,
-            Self::NotAligned => NorFlashErrorKind::NotAligned,
-            Self::Controller(_) | Self::Stuck | Self::Verify | Self::OutputsOn => {
-                NorFlashErrorKind::Other
-            }
-        }
-    }
-}
-
-impl From<NorFlashErrorKind> for FlashError {
-    fn from(kind: NorFlashErrorKind) -> Self {
-        match kind {
-            NorFlashErrorKind::NotAligned => Self::NotAligned,
-            _ => Self::OutOfBounds,
-        }
-    }
-}
-
-/// True if the amplifiers' enable line is low: the pin's input, which shows what is on the line.
-fn enable_line_is_low() -> bool {
-    // SAFETY: a read of a port's inputs changes nothing.
-    let port = unsafe { GPIOC::steal() };
-    port.idr().read().bits() & 1 << ENABLE == 0
-}
 
 /// The two sectors.
 pub(crate) struct SettingsFlash {

@@ -26,80 +26,35 @@
 //! PH0, PH1), and the spare PD2.
 
 #[cfg(not(feature = "output-on-chip"))]
-mod amplifiers;
-#[cfg(feature = "output-on-chip")]
-#[path = "on_chip.rs"]
-mod amplifiers;
-#[cfg(not(feature = "output-on-chip"))]
 mod bus_times;
-#[cfg(not(feature = "output-on-chip"))]
-mod converter_bus;
-pub(crate) mod device;
-mod dma_memory;
+pub(crate) mod chip;
 mod encoders;
 mod flash;
-mod pins;
-mod pulses;
-mod rtt;
-mod serial;
-mod switches;
-mod tick;
-mod watchdog;
+#[cfg(feature = "output-on-chip")]
+mod on_chip;
+#[cfg(not(feature = "output-on-chip"))]
+mod spi;
+mod supply;
+mod usart;
 mod wiring;
 
-use defmt_rtt as _;
-use stm32f4xx_hal::gpio::{Input, PC13};
-use stm32f4xx_hal::pac::{self, DMA1, PWR};
+use stm32f4xx_hal::gpio::{PinState, Pull, Speed};
+use stm32f4xx_hal::pac::{self, DMA1, GPIOA, GPIOC, PWR, TIM4, TIM7};
+#[cfg(not(feature = "output-on-chip"))]
+use stm32f4xx_hal::pac::{DMA2, SPI2, TIM1};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Enable as _, Reset as _};
 
-pub(crate) use self::amplifiers::{Amplifiers, outputs_off};
-pub(crate) use self::encoders::Encoders;
+use self::chip::{CORE_HZ, Supply, Usart};
 pub(crate) use self::flash::SettingsFlash;
-use self::pulses::StepInput;
-pub(crate) use self::serial::Serial;
-pub(crate) use self::switches::Switches;
-pub(crate) use self::tick::Tick;
-use self::watchdog::Supply;
-pub(crate) use self::watchdog::Watchdog;
+#[cfg(feature = "output-on-chip")]
+pub(crate) use self::on_chip::{Amplifiers, outputs_off};
+use self::wiring::INPUTS;
+use super::stm32::pulses::StepInput;
+use super::stm32::switches::pull_ups;
+use super::stm32::{self, Board, Idle, Operator, Serial, Switches, Tick, Watchdog};
 use quadrant::app::PulseLead;
-use quadrant::app::log_ring::TakeLog;
-use quadrant::drivers::hold_button::HoldButton;
-use quadrant::hal::ResetCause;
-use quadrant_law::command::Command;
 use quadrant_law::reference::PulseState;
-
-use super::{Finished, Outcome};
-
-/// Clock of the processor.
-const CORE_HZ: u32 = 180_000_000;
-
-/// The machine, started, in pieces.
-#[allow(dead_code, reason = "which pieces are used is up to the application")]
-pub(crate) struct Board {
-    /// Three position encoders.
-    pub(crate) encoders: Encoders,
-    /// Another control's step and direction.
-    pub(crate) pulses: Pulses,
-    /// The operator's requests.
-    pub(crate) operator: Operator,
-    /// Three amplifiers.
-    pub(crate) amplifiers: Amplifiers,
-    /// The control tick.
-    pub(crate) tick: Tick,
-    /// The work of the idle loop.
-    pub(crate) idle: Idle,
-    /// Limits, homes, amplifier faults, emergency stop.
-    pub(crate) switches: Switches,
-    /// The serial port of the link.
-    pub(crate) serial: Serial,
-    /// The watchdog, with seconds for the start.
-    pub(crate) watchdog: Watchdog,
-    /// The flash for settings.
-    pub(crate) flash: SettingsFlash,
-    /// The cause of the start.
-    pub(crate) reset_cause: ResetCause,
-}
 
 impl Board {
     /// Starts the board, but for the control tick.
@@ -107,7 +62,7 @@ impl Board {
         let Some(chip) = pac::Peripherals::take() else {
             panic!("the board is started twice");
         };
-        let reset_cause = watchdog::reset_cause(&chip.RCC);
+        let reset_cause = supply::reset_cause(&chip.RCC);
         // The debug probe feeds its 8 MHz clock to the oscillator pin. Above 168 MHz the core's regulator must be
         // overdriven, which `freeze` does.
         let clocks = Config::hse(8.MHz())
@@ -118,36 +73,49 @@ impl Board {
         // non-maskable interrupt, which is the end (`fault::DefaultHandler`).
         rcc.cr().modify(|_, w| w.csson().set_bit());
         // Not before: without its 8 MHz the start waits for them.
-        let watchdog = Watchdog::new(chip.IWDG, chip.DBGMCU);
+        let watchdog = Watchdog::new(chip.IWDG);
         let port_a = chip.GPIOA.split(&mut rcc);
         let port_b = chip.GPIOB.split(&mut rcc);
         let port_c = chip.GPIOC.split(&mut rcc);
 
+        // First of all pins, as the amplifiers float until then.
+        let mut enable = port_c.pc9.into_push_pull_output();
+        enable.set_low();
+        let mut brake = port_b.pb5.into_push_pull_output();
+        brake.set_low();
         // Two pieces use streams of it.
         DMA1::enable(&mut rcc);
         DMA1::reset(&mut rcc);
-        // First of all pins, as the amplifiers float until then.
         #[cfg(not(feature = "output-on-chip"))]
         let amplifiers = {
-            let pins = amplifiers::Pins {
-                bus: amplifiers::BusPins {
-                    clock: port_b.pb13,
-                    answer: port_b.pb14,
-                    data: port_b.pb15,
-                    sync: port_b.pb12,
-                    load: port_b.pb1,
-                },
-                clear: port_b.pb2,
-                enable: port_c.pc9,
-                brake: port_b.pb5,
-            };
-            Amplifiers::new((chip.SPI2, chip.TIM1, chip.DMA2), pins, &mut rcc)
+            let clear = port_b.pb2.into_push_pull_output();
+            // High from the first moment: an output that is set afterwards is low for 40 ns, which the converter takes for a frame.
+            let high = PinState::High;
+            let sync = port_b.pb12.into_push_pull_output_in_state(high);
+            let load = port_b.pb1.into_push_pull_output_in_state(high);
+            let lines = (sync.speed(Speed::VeryHigh), load.speed(Speed::VeryHigh));
+            let _ = port_b.pb13.into_alternate::<5>().speed(Speed::VeryHigh);
+            let _ = port_b.pb15.into_alternate::<5>().speed(Speed::VeryHigh);
+            // A converter that is not there answers with ones.
+            let _ = port_b
+                .pb14
+                .into_alternate::<5>()
+                .internal_resistor(Pull::Up);
+            SPI2::enable(&mut rcc);
+            SPI2::reset(&mut rcc);
+            TIM1::enable(&mut rcc);
+            TIM1::reset(&mut rcc);
+            DMA2::enable(&mut rcc);
+            DMA2::reset(&mut rcc);
+            let spi = chip::Spi::new(chip.SPI2);
+            let bus = stm32::converter_bus::ConverterBus::new(spi, chip.TIM1, chip.DMA2, lines);
+            stm32::Amplifiers::new(bus, clear, enable, brake)
         };
         #[cfg(feature = "output-on-chip")]
         let amplifiers = Amplifiers::new(
             chip.DAC,
             (port_a.pa4, port_a.pa5),
-            (port_c.pc9, port_b.pb5),
+            (enable, brake),
             &mut rcc,
         );
         PWR::enable(&mut rcc);
@@ -155,37 +123,53 @@ impl Board {
         if supply.is_low() {
             defmt::warn!("the processor's supply is below 3 V: outputs stay off until it is not");
         }
+        let (of_a, of_c) = INPUTS.pins();
+        // SAFETY: two bits a pin; the pins of the masks are nobody else's, inputs after reset, and this runs before any interrupt that
+        // touches the ports. They are taken by number, as fourteen types would say less than two masks.
+        unsafe {
+            (*GPIOA::ptr())
+                .pupdr()
+                .modify(|r, w| w.bits(r.bits() | pull_ups(of_a)));
+            (*GPIOC::ptr())
+                .pupdr()
+                .modify(|r, w| w.bits(r.bits() | pull_ups(of_c)));
+        }
         let switches = Switches::new(supply);
         let encoder_pins = encoders::Pins {
             x: (port_b.pb8, port_b.pb9, port_b.pb10),
             y: (port_a.pa6, port_a.pa7, port_b.pb0),
             z: (port_c.pc6, port_c.pc7, port_c.pc8),
         };
-        let encoders = Encoders::new(chip.TIM2, chip.TIM3, chip.TIM8, encoder_pins, &mut rcc);
-        let pulse_pins = (port_b.pb6, port_b.pb7, port_a.pa11, port_a.pa12);
+        let timers = (chip.TIM2, chip.TIM3, chip.TIM8);
+        let encoders = encoders::start(timers, encoder_pins, &mut rcc);
+        // A line that is not driven rests high.
+        let _ = (
+            port_b.pb6.into_alternate::<2>().internal_resistor(Pull::Up),
+            port_b.pb7.into_alternate::<2>().internal_resistor(Pull::Up),
+        );
+        TIM4::enable(&mut rcc);
+        TIM4::reset(&mut rcc);
         let memory = cortex_m::singleton!(: PulseState = PulseState::new());
+        let (servo_on, alarm) = (
+            port_a.pa11.into_pull_up_input(),
+            port_a.pa12.into_push_pull_output(),
+        );
         let pulses = PulseLead::new(
-            StepInput::new(chip.TIM4, pulse_pins, &mut rcc),
+            StepInput::new(chip.TIM4, servo_on, alarm),
             [memory, None, None],
         );
-        let serial = Serial::new(chip.USART2, chip.DMA1, (port_a.pa2, port_a.pa3), &mut rcc);
-        match watchdog::brown_out_level(&chip.FLASH) {
-            Some(level) => defmt::info!("brown-out reset: {=str}", level),
-            None => {
-                defmt::warn!("brown-out reset is off: set BOR_LEV once, as the board's page says")
-            }
-        }
-        let operator = Operator {
-            button: port_c.pc13.into_input(),
-            hold: HoldButton::new(),
-        };
-        let tick = Tick::new(chip.TIM7, core.DCB, core.DWT, &mut rcc);
+        let usart = Usart::new(chip.USART2, (port_a.pa2, port_a.pa3), &mut rcc);
+        let serial = Serial::new(usart, chip.DMA1);
+        stm32::report_brown_out(supply::brown_out_level(&chip.FLASH));
+        TIM7::enable(&mut rcc);
+        TIM7::reset(&mut rcc);
+        let rates = (rcc.clocks.timclk1().raw(), rcc.clocks.sysclk().raw());
         Self {
             encoders,
             pulses,
-            operator,
+            operator: Operator::new(port_c.pc13.into_input()),
             amplifiers,
-            tick,
+            tick: Tick::new(chip.TIM7, rates, core.DCB, core.DWT),
             idle: Idle,
             switches,
             serial,
@@ -200,60 +184,5 @@ impl Board {
 /// the tick leaves too little to the other tasks.
 pub(crate) const RATES_HZ: (f64, f64) = (2.5e3, 1.5e4);
 
-/// Takes bytes of the log out of its buffer.
-pub(crate) const TAKE_LOG: Option<TakeLog> = Some(rtt::take);
-
-/// The axes whose steps of another control are counted: one timer is left.
-pub(crate) const PULSE_AXES: [bool; 3] = [true, false, false];
-
-/// Another control that leads axes.
-pub(crate) type Pulses = PulseLead<'static, StepInput>;
-
 /// The board's name.
 pub(crate) const NAME: &str = "nucleo-f446re";
-
-/// Starts the firmware afresh.
-pub(crate) fn restart() -> ! {
-    cortex_m::peripheral::SCB::sys_reset()
-}
-
-/// The job that a host has left: none, the board has no such host.
-pub(crate) fn job() -> Option<&'static [u8]> {
-    None
-}
-
-/// The operator's requests: the button is a dead man's switch.
-pub(crate) struct Operator {
-    button: PC13<Input>,
-    hold: HoldButton,
-}
-
-impl Operator {
-    /// Returns this tick's request.
-    #[inline(always)]
-    pub(crate) fn request(&mut self) -> Option<Command> {
-        // Pressed is low.
-        self.hold.step(self.button.is_low())
-    }
-}
-
-/// The work of the idle loop.
-pub(crate) struct Idle;
-
-impl Idle {
-    /// One turn of the idle loop: nothing. It never finishes.
-    ///
-    /// It does not sleep: a sleeping core is cut off from the debug probe that reads the log.
-    pub(crate) fn turn(&mut self) -> Option<Finished> {
-        cortex_m::asm::nop();
-        None
-    }
-}
-
-/// Stays put, with interrupts off, until somebody resets the board.
-pub(crate) fn halt(_outcome: Outcome) -> ! {
-    cortex_m::interrupt::disable();
-    loop {
-        cortex_m::asm::nop();
-    }
-}

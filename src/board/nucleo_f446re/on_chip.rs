@@ -6,11 +6,11 @@
 use quadrant::hal;
 use quadrant_law::noise_shaper::{NoiseShaper, NoiseShaperState};
 use quadrant_law::stage::Outputs;
-use stm32f4xx_hal::gpio::{Output, PA4, PA5, PB5, PC9};
-use stm32f4xx_hal::pac::{self, DAC};
+use stm32f4xx_hal::gpio::{PA4, PA5};
+use stm32f4xx_hal::pac::DAC;
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-use super::pins::{BRAKE, ENABLE};
+use super::chip::{self, Brake, Enable as EnableLine};
 
 /// The word in the middle: zero volts.
 const ZERO: u32 = 2048;
@@ -22,18 +22,19 @@ const SHAPER: NoiseShaper = NoiseShaper::FirstOrder;
 /// Two amplifiers of three.
 pub(crate) struct Amplifiers {
     converter: DAC,
-    enable: PC9<Output>,
-    brake: PB5<Output>,
+    enable: EnableLine,
+    brake: Brake,
     states: [NoiseShaperState; 2],
 }
 
 impl Amplifiers {
-    /// Starts the converters with zero volts and the amplifiers disabled.
-    pub(super) fn new(converter: DAC, pins: (PA4, PA5), lines: (PC9, PB5), rcc: &mut Rcc) -> Self {
-        let mut enable = lines.0.into_push_pull_output();
-        enable.set_low();
-        let mut brake = lines.1.into_push_pull_output();
-        brake.set_low();
+    /// Starts the converters with zero volts. Enable line and brake are low.
+    pub(super) fn new(
+        converter: DAC,
+        pins: (PA4, PA5),
+        (enable, brake): (EnableLine, Brake),
+        rcc: &mut Rcc,
+    ) -> Self {
         DAC::enable(rcc);
         DAC::reset(rcc);
         write_both(&converter, [0; 2]);
@@ -88,11 +89,8 @@ fn write_both(converter: &DAC, [x, y]: [i16; 2]) {
 
 /// Zero volts, amplifiers disabled, brake applied, from any context: also from a panic before or in the middle of anything.
 pub(crate) fn outputs_off() {
-    // SAFETY: the owner of these peripherals does not run again: this runs with interrupts disabled on the way to
-    // `halt`. Only single register writes are made, each valid in any state the owner left.
-    let (port_b, port_c, converter) =
-        unsafe { (pac::GPIOB::steal(), pac::GPIOC::steal(), DAC::steal()) };
-    port_c.bsrr().write(|w| w.br(ENABLE).set_bit());
-    port_b.bsrr().write(|w| w.br(BRAKE).set_bit());
-    write_both(&converter, [0; 2]);
+    chip::lines_off();
+    // SAFETY: the owner of the converters does not run again: this runs with interrupts disabled on the way to `halt`. A single
+    // write, valid in any state that it left.
+    write_both(&unsafe { DAC::steal() }, [0; 2]);
 }

@@ -3,7 +3,7 @@
 use core::cell::UnsafeCell;
 
 /// Items in static memory, read and written one by one and volatile: a stream may do the same at any time.
-pub(super) struct DmaMemory<T, const N: usize>(UnsafeCell<[T; N]>);
+pub(crate) struct DmaMemory<T, const N: usize>(UnsafeCell<[T; N]>);
 
 // SAFETY: each is touched by one driver alone, which exists once, as it owns the peripherals; what the streams do at the same time is
 // met with volatile accesses.
@@ -11,12 +11,12 @@ unsafe impl<T, const N: usize> Sync for DmaMemory<T, N> {}
 
 impl<T: Copy, const N: usize> DmaMemory<T, N> {
     /// Memory that holds these items.
-    pub(super) const fn new(items: [T; N]) -> Self {
+    pub(crate) const fn new(items: [T; N]) -> Self {
         Self(UnsafeCell::new(items))
     }
 
     /// Its address, for a stream.
-    pub(super) fn address(&self) -> u32 {
+    pub(crate) fn address(&self) -> u32 {
         self.0.get() as u32
     }
 
@@ -27,14 +27,14 @@ impl<T: Copy, const N: usize> DmaMemory<T, N> {
 
     /// The item at a place.
     #[inline(always)]
-    pub(super) fn read(&self, index: usize) -> T {
+    pub(crate) fn read(&self, index: usize) -> T {
         // SAFETY: one of the items, which are static.
         unsafe { self.place(index).read_volatile() }
     }
 
     /// Writes items from a place on.
     #[inline(always)]
-    pub(super) fn write(&self, first: usize, items: impl IntoIterator<Item = T>) {
+    pub(crate) fn write(&self, first: usize, items: impl IntoIterator<Item = T>) {
         for (index, item) in (first..).zip(items) {
             // SAFETY: one of the items, which are static.
             unsafe { self.place(index).write_volatile(item) };

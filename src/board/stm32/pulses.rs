@@ -1,17 +1,14 @@
 //! Step and direction of another control, for one axis, and its lines SERVO ON and ALARM.
 //!
-//! Timer 4 counts the rising edges of the step line (RM0390, 17.3.3 "External clock source mode 1": its clock is the filtered input of
-//! channel 1) and captures the count at both edges of the direction line on channel 2, so that each step has its sense however late the
-//! tick reads it ([`StepCounter`]). Encoder mode would count both edges of a step, one forth and one back (17.3.12, table of "Counting
-//! direction versus encoder signals"), and no other timer with two free inputs is left: one axis, and that is x.
+//! A timer counts the rising edges of the step line (RM0390, 17.3.3 "External clock source mode 1"; RM0433, 38.3.5: its
+//! clock is the filtered input of channel 1) and captures the count at both edges of the direction line on channel 2, so that each
+//! step has its sense however late the tick reads it ([`StepCounter`]). Encoder mode would count both edges of a step, one forth and
+//! one back (17.3.12, table of "Counting direction versus encoder signals").
 
 use quadrant::drivers::step_counter::{StepCounter, StepReading};
 use quadrant::hal::{self, PulseReadings};
-use stm32f4xx_hal::gpio::{Input, Output, PA11, PA12, PB6, PB7, Pull};
-use stm32f4xx_hal::pac::{GPIOB, TIM4};
-use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-use super::wiring::ENCODER_FILTER;
+use crate::board::chip::{Alarm, ENCODER_FILTER, FILTER_CLOCK, ServoOn, StepTimer, is_backwards};
 
 /// TIMx_CCMR1: channels 1 and 2 are inputs from their own pins (CC1S = CC2S = 01), filtered (IC1F, IC2F) equally: both lines are late by
 /// the same time.
@@ -22,34 +19,18 @@ const CAPTURE_BOTH_EDGES: u32 = 1 << 4 | 1 << 5 | 1 << 7;
 const CLOCK_FROM_STEP: u32 = 0b111 | 0b101 << 4;
 /// TIMx_CR1: counter enabled (CEN).
 const ENABLE: u32 = 1;
-/// GPIOB_IDR: the direction line.
-const DIRECTION: u32 = 1 << 7;
-
-/// The pins: step, direction, SERVO ON, ALARM.
-pub(super) type Pins = (PB6, PB7, PA11, PA12);
 
 /// The lines of a control that leads x.
 pub(crate) struct StepInput {
-    timer: TIM4,
+    timer: StepTimer,
     counter: StepCounter,
-    servo_on: PA11<Input>,
-    alarm: PA12<Output>,
+    servo_on: ServoOn,
+    alarm: Alarm,
 }
 
 impl StepInput {
-    /// Starts counting from zero.
-    pub(super) fn new(
-        timer: TIM4,
-        (step, direction, servo_on, alarm): Pins,
-        rcc: &mut Rcc,
-    ) -> Self {
-        // A line that is not driven rests high.
-        let _ = (
-            step.into_alternate::<2>().internal_resistor(Pull::Up),
-            direction.into_alternate::<2>().internal_resistor(Pull::Up),
-        );
-        TIM4::enable(rcc);
-        TIM4::reset(rcc);
+    /// Starts counting from zero. The timer is clocked and reset, and its pins have their function.
+    pub(crate) fn new(timer: StepTimer, servo_on: ServoOn, alarm: Alarm) -> Self {
         // SAFETY: the values are the manual's for these registers, as the constants say.
         unsafe {
             timer
@@ -58,25 +39,18 @@ impl StepInput {
             timer.ccer().write(|w| w.bits(CAPTURE_BOTH_EDGES as _));
             timer.smcr().write(|w| w.bits(CLOCK_FROM_STEP as _));
             timer.arr().write(|w| w.bits(u16::MAX.into()));
-            timer.cr1().write(|w| w.bits(ENABLE as _));
+            timer.cr1().write(|w| w.bits((ENABLE | FILTER_CLOCK) as _));
             // No event on the inputs before this point was a turn.
             timer.sr().write(|w| w.bits(0));
         }
-        let counter = StepCounter::new(timer.cnt().read().cnt().bits(), is_backwards());
+        let counter = StepCounter::new(timer.cnt().read().bits() as u16, is_backwards());
         Self {
             timer,
             counter,
-            servo_on: servo_on.into_pull_up_input(),
-            alarm: alarm.into_push_pull_output(),
+            servo_on,
+            alarm,
         }
     }
-}
-
-/// True if the direction line is on: high.
-#[inline(always)]
-fn is_backwards() -> bool {
-    // SAFETY: reading a port's levels changes nothing and needs no owner.
-    unsafe { (*GPIOB::ptr()).idr().read().bits() & DIRECTION != 0 }
 }
 
 impl hal::Pulses for StepInput {
@@ -84,7 +58,7 @@ impl hal::Pulses for StepInput {
     #[inline(always)]
     fn read(&mut self) -> PulseReadings {
         let direction = is_backwards();
-        let raw = self.timer.cnt().read().cnt().bits();
+        let raw = self.timer.cnt().read().bits() as u16;
         let status = self.timer.sr().read();
         // Reading CCR2 clears CC2IF.
         let turned = status

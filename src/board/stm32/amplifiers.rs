@@ -5,55 +5,29 @@ use quadrant::drivers::ad5754r::steps::FRAME_STEPS;
 use quadrant::drivers::ad5754r::{ALL_ZERO, Ad5754r, Error, Item};
 use quadrant::hal;
 use quadrant_law::stage::Outputs;
-use stm32f4xx_hal::gpio::{Output, PB2, PB5, PC9};
-use stm32f4xx_hal::pac::{self, DMA2, SPI2, TIM1};
-use stm32f4xx_hal::rcc::Rcc;
 
-use super::CORE_HZ;
-use super::bus_times::{READING, WRITING};
 use super::converter_bus::ConverterBus;
-pub(super) use super::converter_bus::Pins as BusPins;
-use super::pins::{BRAKE, ENABLE, LOAD, SYNC};
-
-/// Number of /CLR in port B.
-const CLEAR: u8 = 2;
-/// Largest number of polls of the bus before giving up, in the emergency path: far more than one byte takes.
-const PATIENCE: u32 = 10_000;
+use crate::board::chip::{self, Brake, CORE_HZ, CYCLES_PER_TURN, Clear, Enable, READING, WRITING};
 
 // A tenth of a control period at 10 kHz is what the outputs may take, and the reading is over before the shortest tick writes.
 const _: () = assert!(WRITING.load_ns() < 10_000);
 const _: () = assert!(READING.steps_ns(FRAME_STEPS) < 8_000);
 
-/// The pins of the amplifiers, as they are after reset.
-pub(super) struct Pins {
-    pub(super) bus: BusPins,
-    pub(super) clear: PB2,
-    pub(super) enable: PC9,
-    pub(super) brake: PB5,
-}
-
-type Converter = Ad5754r<ConverterBus, PB2<Output>, CoreDelay>;
+type Converter = Ad5754r<ConverterBus, Clear, CoreDelay>;
 
 /// Three amplifiers.
 pub(crate) struct Amplifiers {
     converter: Converter,
-    enable: PC9<Output>,
-    brake: PB5<Output>,
+    enable: Enable,
+    brake: Brake,
     /// The converter answered when it was started. One that did not is left alone, and nothing is ever enabled.
     is_present: bool,
     mismatches: [bool; 3],
 }
 
 impl Amplifiers {
-    /// Starts the converter with zero volts and the amplifiers disabled.
-    pub(super) fn new(parts: (SPI2, TIM1, DMA2), pins: Pins, rcc: &mut Rcc) -> Self {
-        let mut enable = pins.enable.into_push_pull_output();
-        enable.set_low();
-        let mut brake = pins.brake.into_push_pull_output();
-        brake.set_low();
-        let clear = pins.clear.into_push_pull_output();
-        let (spi, timer, dma) = parts;
-        let bus = ConverterBus::new(spi, timer, dma, pins.bus, rcc);
+    /// Starts the converter with zero volts. Enable line, brake and /CLR are outputs, and low.
+    pub(crate) fn new(bus: ConverterBus, clear: Clear, enable: Enable, brake: Brake) -> Self {
         let mut converter = Ad5754r::new(bus, clear, CoreDelay);
         let is_present = match converter.start() {
             Ok(()) => true,
@@ -133,12 +107,8 @@ impl hal::Amplifiers for Amplifiers {
     }
 }
 
-/// Short waits by counting turns of a loop.
-pub(super) struct CoreDelay;
-
-/// Cycles that a turn of `cortex_m::asm::delay`'s loop takes at least: one for the subtraction, two for a branch that is
-/// taken (Cortex-M4 TRM, 3.3.1).
-const CYCLES_PER_TURN: u32 = 3;
+/// Short waits by counting turns of the loop of `cortex_m::asm::delay`.
+pub(crate) struct CoreDelay;
 
 impl DelayNs for CoreDelay {
     #[inline(always)]
@@ -154,52 +124,8 @@ impl DelayNs for CoreDelay {
 
 /// Zero volts, amplifiers disabled, brake applied, from any context: also from a panic before or in the middle of anything.
 pub(crate) fn outputs_off() {
-    // SAFETY: the owner of these peripherals does not run again: this runs with interrupts disabled on the way to
-    // `halt`. Only single register writes are made, each valid in any state the owner left.
-    let (port_b, port_c, bus, timer, dma) = unsafe {
-        (
-            pac::GPIOB::steal(),
-            pac::GPIOC::steal(),
-            pac::SPI2::steal(),
-            pac::TIM1::steal(),
-            pac::DMA2::steal(),
-        )
-    };
     // First of all, and independent of the bus.
-    port_c.bsrr().write(|w| w.br(ENABLE).set_bit());
-    port_b.bsrr().write(|w| w.br(BRAKE).set_bit());
-    port_b.bsrr().write(|w| w.br(CLEAR).set_bit());
-
-    // /CLR holds the outputs at zero; should that wire be broken, the zero codes do. End the frame that may be under way;
-    // the chip ignores it unless it is complete.
-    timer.cr1().reset();
-    for stream in dma.st_iter() {
-        stream.cr().reset();
-    }
-    wait_for(|| !bus.sr().read().bsy().bit_is_set());
-    port_b
-        .bsrr()
-        .write(|w| w.bs(SYNC).set_bit().bs(LOAD).set_bit());
-    CoreDelay.delay_us(1);
-    port_b.bsrr().write(|w| w.br(SYNC).set_bit());
-    for byte in ALL_ZERO {
-        wait_for(|| bus.sr().read().txe().bit_is_set());
-        bus.dr8().write(|w| w.dr().set(byte));
-    }
-    wait_for(|| bus.sr().read().txe().bit_is_set());
-    wait_for(|| !bus.sr().read().bsy().bit_is_set());
-    port_b.bsrr().write(|w| w.bs(SYNC).set_bit());
-    CoreDelay.delay_us(1);
-    port_b.bsrr().write(|w| w.br(LOAD).set_bit());
-    CoreDelay.delay_us(1);
-    port_b.bsrr().write(|w| w.bs(LOAD).set_bit());
-}
-
-/// Waits for the bus, with a limit: a bus that was never started does not get ready.
-fn wait_for(ready: impl Fn() -> bool) {
-    for _ in 0..PATIENCE {
-        if ready() {
-            return;
-        }
-    }
+    chip::lines_off();
+    // /CLR holds the outputs at zero; should that wire be broken, the zero codes do.
+    super::converter_bus::send_at_last(ALL_ZERO, &mut CoreDelay);
 }

@@ -1,82 +1,65 @@
-//! The converter's bus: SPI 2 in mode 1, /SYNC and /LDAC, all three moved by timer 1 and DMA.
+//! The converter's bus: an SPI in mode 1, /SYNC and /LDAC, all three moved by an advanced timer and DMA.
 //!
-//! In every step of timer 1 (`quadrant::drivers::ad5754r::steps`) its first channel makes DMA 2 write a word to port B, its
-//! second one a byte to the SPI; DMA 1 takes the byte that comes back. The timer's repetition counter counts the steps, and
+//! In every step of the timer (`quadrant::drivers::ad5754r::steps`) its first channel makes DMA 2 write a word to the port of
+//! /SYNC and /LDAC, its second one a byte to the SPI; DMA 1 takes the byte that comes back. The timer's repetition counter counts the steps, and
 //! its one-pulse mode stops it behind the last one. The processor fills the table of bytes, arms the streams and starts
 //! the timer.
 
 use core::sync::atomic::{Ordering, fence};
 
+use embedded_hal::delay::DelayNs;
 use quadrant::drivers::ad5754r::Sequencer;
 use quadrant::drivers::ad5754r::steps::{
     BYTE_AT, FRAME_STEPS, FRAMES_AT, MAX_STEPS, PIN_CHANGES, PINS_AT, PinChange,
 };
-use stm32f4xx_hal::gpio::{Output, PB1, PB12, PB13, PB14, PB15, PinState, Pull, Speed};
-use stm32f4xx_hal::pac::{DMA1, DMA2, GPIOB, SPI2, TIM1};
-use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-use super::CORE_HZ;
-use super::bus_times::{READING, TIMER_HZ, WRITING};
 use super::dma_memory::DmaMemory;
-use super::pins::{LOAD, SYNC};
+use crate::board::chip::pac::{DMA1, DMA2};
+use crate::board::chip::{
+    self, ConverterTimer, LOAD, Load, PATIENCE, READING, Rate, SPI_STREAM, SYNC, Spi, Sync,
+    TIMER_STREAM, WRITING,
+};
 
-const _: () = assert!(TIMER_HZ == CORE_HZ);
-
-/// SPI_CR1 (RM0390, 26.7.1): clock phase 1 (CPHA), master (MSTR), on (SPE), and slave select by software (SSI, SSM).
-const SPI_CR1: u16 = 1 | 1 << 2 | 1 << 6 | 1 << 8 | 1 << 9;
-/// SPI_CR1, bits BR: the peripheral clock divided by 2 and by 8.
-const BY_2: u16 = 0b000 << 3;
-const BY_8: u16 = 0b010 << 3;
-
-/// TIM1_CR1 (RM0390, 16.4.1): only the counter's end is an update (URS), which stops it (OPM); with and without its start (CEN).
+/// TIMx_CR1 (RM0390, 16.4.1; RM0433, 38.4.1): only the counter's end is an update (URS), which stops it (OPM); with and without its start (CEN).
 const TIMER_STOPPED: u32 = 1 << 2 | 1 << 3;
 const TIMER_STARTED: u32 = TIMER_STOPPED | 1;
 
-/// Streams of DMA 2 (RM0390, table 29): TIM1_CH1 is stream 1, TIM1_CH2 is stream 2, both on channel 6.
-const PINS: usize = 1;
-const BYTES: usize = 2;
-/// Stream of DMA 1 (RM0390, table 28): SPI2_RX is stream 3, on channel 0.
-const RECEIVER: usize = 3;
-/// DMA_SxCR (RM0390, 9.5.5): channel (CHSEL), priority (PL), sizes in memory and at the peripheral (MSIZE, PSIZE: 0 a byte, 2 a
-/// word), memory incremented (MINC), from memory (DIR).
-const PINS_CR: u32 = 6 << 25 | 0b11 << 16 | 2 << 13 | 2 << 11 | 1 << 10 | 0b01 << 6;
-const BYTES_CR: u32 = 6 << 25 | 0b10 << 16 | 1 << 10 | 0b01 << 6;
-const RECEIVER_CR: u32 = 0b11 << 16 | 1 << 10;
+/// Streams of DMA 2 for the timer's first and second channel.
+pub(crate) const PINS: usize = 1;
+pub(crate) const BYTES: usize = 2;
+/// Stream of DMA 1 for what the SPI receives.
+pub(crate) const RECEIVER: usize = 3;
+/// DMA_SxCR (RM0390, 9.5.5; RM0433, 15.5.5): priority (PL), sizes in memory and at the peripheral (MSIZE, PSIZE: 0 a byte, 2 a
+/// word), memory incremented (MINC), from memory (DIR); the chip adds what selects the request.
+const PINS_CR: u32 = TIMER_STREAM | 0b11 << 16 | 2 << 13 | 2 << 11 | 1 << 10 | 0b01 << 6;
+const BYTES_CR: u32 = TIMER_STREAM | 0b10 << 16 | 1 << 10 | 0b01 << 6;
+const RECEIVER_CR: u32 = SPI_STREAM | 0b11 << 16 | 1 << 10;
 /// DMA_SxCR, EN.
 const ON: u32 = 1;
 /// DMA_LIFCR: all five flags of streams 1 and 2, and of stream 3.
 const CLEAR_PINS_AND_BYTES: u32 = 0b11_1101 << 6 | 0b11_1101 << 16;
 const CLEAR_RECEIVER: u32 = 0b11_1101 << 22;
 
-/// Largest number of polls of what was started before giving up: the longest takes some 2100 cycles, a look nine at least.
-const PATIENCE: u32 = 300;
-
-/// Words for the set/reset register of port B, in RAM: flash cannot be read while it is erased.
+/// Words for the set/reset register of the port of /SYNC and /LDAC.
+#[unsafe(link_section = ".bss.dma.pins")]
 static PIN_WORDS: DmaMemory<u32, MAX_STEPS> = DmaMemory::new([0; MAX_STEPS]);
 /// Bytes to send, zero where the chip does not receive them.
+#[unsafe(link_section = ".bss.dma.to_converter")]
 static TO_SEND: DmaMemory<u8, MAX_STEPS> = DmaMemory::new([0; MAX_STEPS]);
+#[unsafe(link_section = ".bss.dma.from_converter")]
 static RECEIVED: DmaMemory<u8, MAX_STEPS> = DmaMemory::new([0; MAX_STEPS]);
 
 /// The bus did not do its work in time: it is not clocked, or was switched off.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stuck;
-
-/// The pins of the bus, as they are after reset.
-pub(super) struct Pins {
-    pub(super) clock: PB13,
-    pub(super) answer: PB14,
-    pub(super) data: PB15,
-    pub(super) sync: PB12,
-    pub(super) load: PB1,
-}
+pub(crate) struct Stuck;
 
 /// The converter's bus.
-pub(super) struct ConverterBus {
-    spi: SPI2,
-    timer: TIM1,
+pub(crate) struct ConverterBus {
+    spi: Spi,
+    timer: ConverterTimer,
     dma: DMA2,
-    sync: PB12<Output>,
-    load: PB1<Output>,
+    sync: Sync,
+    load: Load,
 }
 
 /// The controller of the receiving stream.
@@ -87,32 +70,13 @@ fn receiver_dma() -> DMA1 {
 }
 
 impl ConverterBus {
-    /// Starts the bus, with both pins high. DMA 1 is clocked.
-    pub(super) fn new(spi: SPI2, timer: TIM1, dma: DMA2, pins: Pins, rcc: &mut Rcc) -> Self {
-        // High from the first moment: an output that is set afterwards is low for 40 ns, which the converter takes for a frame.
-        let high = PinState::High;
-        let sync = pins
-            .sync
-            .into_push_pull_output_in_state(high)
-            .speed(Speed::VeryHigh);
-        let load = pins
-            .load
-            .into_push_pull_output_in_state(high)
-            .speed(Speed::VeryHigh);
-        let _ = pins.clock.into_alternate::<5>().speed(Speed::VeryHigh);
-        let _ = pins.data.into_alternate::<5>().speed(Speed::VeryHigh);
-        // A converter that is not there answers with ones.
-        let _ = pins
-            .answer
-            .into_alternate::<5>()
-            .internal_resistor(Pull::Up);
-        SPI2::enable(rcc);
-        SPI2::reset(rcc);
-        TIM1::enable(rcc);
-        TIM1::reset(rcc);
-        DMA2::enable(rcc);
-        DMA2::reset(rcc);
-        spi.cr2().write(|w| w.rxdmaen().set_bit());
+    /// Starts the bus. SPI, timer and both controllers are clocked and reset, and both pins are outputs and high.
+    pub(crate) fn new(
+        spi: Spi,
+        timer: ConverterTimer,
+        dma: DMA2,
+        (sync, load): (Sync, Load),
+    ) -> Self {
         PIN_WORDS.write(0, PIN_CHANGES.map(word));
 
         // SAFETY: counts of the timer, whose step they lie in.
@@ -125,16 +89,19 @@ impl ConverterBus {
             .dier()
             .write(|w| w.cc1de().enabled().cc2de().enabled());
 
-        // SAFETY: only the register's address is taken.
-        let port = unsafe { GPIOB::steal() }.bsrr().as_ptr() as u32;
-        let data_register = spi.dr8().as_ptr() as u32;
+        let (data_out, data_in) = spi.data_addresses();
         let receiver = receiver_dma();
         for (stream, peripheral, memory, configuration) in [
-            (dma.st(PINS), port, PIN_WORDS.address(), PINS_CR),
-            (dma.st(BYTES), data_register, TO_SEND.address(), BYTES_CR),
+            (
+                dma.st(PINS),
+                chip::port_address(),
+                PIN_WORDS.address(),
+                PINS_CR,
+            ),
+            (dma.st(BYTES), data_out, TO_SEND.address(), BYTES_CR),
             (
                 receiver.st(RECEIVER),
-                data_register,
+                data_in,
                 RECEIVED.address(),
                 RECEIVER_CR,
             ),
@@ -157,14 +124,14 @@ impl ConverterBus {
 
     /// Starts steps of the tables from their beginning. The timer rests, and so do the streams.
     #[inline(always)]
-    fn start(&mut self, steps: usize, step_cycles: u32, rate: u16) {
+    fn start(&mut self, steps: usize, step_cycles: u32, rate: Rate) {
         let receiver = receiver_dma();
         // What was filled in is there before the streams look for it.
         fence(Ordering::Release);
+        self.spi.start(rate, steps as u32);
         // SAFETY: ones clear the flags of these streams; the rest are values of the manual, as the constants say. The streams'
         // configuration is that of `new`, and only this switches them on.
         unsafe {
-            self.spi.cr1().write(|w| w.bits(SPI_CR1 | rate));
             self.dma.lifcr().write(|w| w.bits(CLEAR_PINS_AND_BYTES));
             receiver.lifcr().write(|w| w.bits(CLEAR_RECEIVER));
             for (stream, configuration) in [
@@ -211,9 +178,7 @@ impl ConverterBus {
         }
         self.sync.set_high();
         self.load.set_high();
-        // A byte that came too late must not be taken for the next one's; reading both also clears an overrun.
-        let _ = self.spi.dr8().read();
-        let _ = self.spi.sr().read();
+        self.spi.discard();
         Err(Stuck)
     }
 }
@@ -229,13 +194,13 @@ impl Sequencer for ConverterBus {
         TO_SEND.write(at_second, second);
         TO_SEND.write(at_third, third);
         TO_SEND.write(at_fourth, fourth);
-        self.start(MAX_STEPS, const { WRITING.step_cycles() }, BY_2);
+        self.start(MAX_STEPS, const { WRITING.step_cycles() }, Rate::Write);
     }
 
     #[inline(always)]
     fn start_reading(&mut self, frame: [u8; 3]) {
         TO_SEND.write(0, frame);
-        self.start(FRAME_STEPS, const { READING.step_cycles() }, BY_8);
+        self.start(FRAME_STEPS, const { READING.step_cycles() }, Rate::Read);
     }
 
     #[inline(always)]
@@ -249,7 +214,7 @@ impl Sequencer for ConverterBus {
     }
 }
 
-/// The set/reset register's word for a change (RM0390, 7.4.7): the lower half sets pins, the upper half resets them.
+/// The set/reset register's word for a change (RM0390, 7.4.7; RM0433, 11.4.7): the lower half sets pins, the upper half resets them.
 const fn word(change: PinChange) -> u32 {
     match change {
         PinChange::Keep => 0,
@@ -257,5 +222,37 @@ const fn word(change: PinChange) -> u32 {
         PinChange::Release => 1 << SYNC,
         PinChange::Load => 1 << (16 + LOAD),
         PinChange::EndLoad => 1 << LOAD,
+    }
+}
+
+/// Sends a frame and pulses /LDAC, by the processor alone, from any context.
+pub(crate) fn send_at_last(frame: [u8; 3], delay: &mut impl DelayNs) {
+    // SAFETY: the owners of timer and streams do not run again; only single writes are made, each valid in any state they left.
+    let (timer, dma) = unsafe { (ConverterTimer::steal(), DMA2::steal()) };
+    // End the frame that may be under way; the chip ignores it unless it is complete.
+    timer.cr1().reset();
+    for stream in [PINS, BYTES] {
+        dma.st(stream).cr().reset();
+    }
+    Spi::end_at_last();
+    chip::set_lines(1 << SYNC | 1 << LOAD);
+    delay.delay_us(1);
+    chip::set_lines(1 << (16 + SYNC));
+    Spi::send_at_last(frame);
+    chip::set_lines(1 << SYNC);
+    delay.delay_us(1);
+    chip::set_lines(1 << (16 + LOAD));
+    delay.delay_us(1);
+    chip::set_lines(1 << LOAD);
+}
+
+/// Waits for a peripheral, with a limit: one that was never started does not get ready.
+pub(crate) fn wait_at_last(ready: impl Fn() -> bool) {
+    /// Far more than one byte takes.
+    const LOOKS: u32 = 10_000;
+    for _ in 0..LOOKS {
+        if ready() {
+            return;
+        }
     }
 }

@@ -1,10 +1,9 @@
 //! Description of the chip for RTIC, with the interrupts we use named by role.
 //!
-//! The vector table itself is the chip crate's; `roles.x` declares to the linker which entry plays which role.
+//! The vector table itself is the chip crate's; the board's `roles.x` declares to the linker which entry plays which role.
 
-use stm32f4xx_hal::pac;
-
-pub(crate) use stm32f4xx_hal::pac::NVIC_PRIO_BITS;
+pub(crate) use crate::board::chip::pac::NVIC_PRIO_BITS;
+use crate::board::chip::{CONTROL_TICK, DISPATCHERS};
 
 /// The interrupts the application uses.
 #[derive(Clone, Copy)]
@@ -19,13 +18,13 @@ pub(crate) use stm32f4xx_hal::pac::NVIC_PRIO_BITS;
 )]
 pub(crate) enum Interrupt {
     /// The control tick: basic timer 7.
-    CONTROL_TICK = pac::Interrupt::TIM7 as u16,
+    CONTROL_TICK = CONTROL_TICK as u16,
     /// A task dispatcher, on a vector of the CAN controller, which we leave switched off.
-    DISPATCHER_0 = pac::Interrupt::CAN1_TX as u16,
+    DISPATCHER_0 = DISPATCHERS[0] as u16,
     /// A task dispatcher, likewise.
-    DISPATCHER_1 = pac::Interrupt::CAN1_RX0 as u16,
+    DISPATCHER_1 = DISPATCHERS[1] as u16,
     /// A task dispatcher, likewise.
-    DISPATCHER_2 = pac::Interrupt::CAN1_RX1 as u16,
+    DISPATCHER_2 = DISPATCHERS[2] as u16,
 }
 
 // SAFETY: every number is a line of the interrupt controller, and `number` is constant for a variant.

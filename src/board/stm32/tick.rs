@@ -2,8 +2,8 @@
 
 use cortex_m::peripheral::{DCB, DWT};
 use quadrant::drivers::tick_interval::TickInterval;
-use stm32f4xx_hal::pac::TIM7;
-use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
+
+use crate::board::chip::pac::TIM7;
 
 /// The control tick.
 pub(crate) struct Tick {
@@ -15,17 +15,20 @@ pub(crate) struct Tick {
 }
 
 impl Tick {
-    /// The timer, not counting; starts the core's counter of cycles.
-    pub(super) fn new(timer: TIM7, mut trace: DCB, mut counter: DWT, rcc: &mut Rcc) -> Self {
+    /// The timer, clocked, reset and not counting, and its rate and the core's, Hz; starts the core's counter of cycles.
+    pub(crate) fn new(
+        timer: TIM7,
+        (clock_hz, core_hz): (u32, u32),
+        mut trace: DCB,
+        mut counter: DWT,
+    ) -> Self {
         trace.enable_trace();
         counter.enable_cycle_counter();
-        TIM7::enable(rcc);
-        TIM7::reset(rcc);
         Self {
             timer,
-            clock_hz: rcc.clocks.timclk1().raw(),
+            clock_hz,
             period: u32::MAX,
-            core_hz: rcc.clocks.sysclk().raw(),
+            core_hz,
             interval: TickInterval::new(u32::MAX, 0),
         }
     }

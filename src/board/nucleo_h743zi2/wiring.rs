@@ -1,0 +1,30 @@
+//! Meaning of the bits in the board's words. No registers here: the tests of the library include this file and run it on the host.
+
+use quadrant::drivers::input_filter::{InputFilter, shortest_level_ns};
+use quadrant::drivers::reset_flags::ResetFlags;
+use quadrant::drivers::switch_inputs::SwitchInputs;
+
+/// The fastest an encoder may count, per second: an axis at 250 mm/s with 0.5 um per count, and twice that, as the
+/// control law believes an encoder up to twice the axis' largest velocity.
+const FASTEST_COUNTS_PER_S: u32 = 1_000_000;
+
+/// The filter of all encoder inputs: the timers run at 240 MHz, a quarter of which is the filter's clock (CKD = 10).
+pub(crate) const ENCODER_FILTER: InputFilter =
+    InputFilter::strongest(240_000_000, 4, shortest_level_ns(FASTEST_COUNTS_PER_S));
+
+/// Ports D and F.
+pub(crate) const INPUTS: SwitchInputs = SwitchInputs {
+    first_fault: 3,
+    first_limit: 0,
+    first_home: 7,
+};
+
+/// RCC_RSR (RM0433, 8.7.39): LPWRRSTF, WWDG1RSTF and IWDG1RSTF, SFTRSTF, PORRSTF, BORRSTF, PINRSTF.
+pub(crate) const RESETS: ResetFlags = ResetFlags {
+    low_power: 1 << 30,
+    watchdog: 1 << 28 | 1 << 26,
+    software: 1 << 24,
+    power_on: 1 << 23,
+    brown_out: 1 << 21,
+    pin: 1 << 22,
+};
