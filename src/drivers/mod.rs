@@ -6,5 +6,6 @@ pub mod counter;
 pub mod dma_ring;
 pub mod hold_button;
 pub mod input_filter;
+pub mod serial_encoder;
 pub mod step_counter;
 pub mod tick_interval;
