@@ -10,9 +10,17 @@ use embedded_storage::nor_flash::NorFlash;
 use quadrant_law::encoder::EncoderReading;
 use quadrant_law::safety;
 use quadrant_law::stage::Outputs;
+use quadrant_settings::EncoderSettings;
 
 /// The three axes' encoders.
 pub trait Encoders {
+    /// The axes of which the board reads a serial encoder.
+    const SERIAL_AXES: [bool; 3] = [false; 3];
+
+    /// Prepares for encoders with these settings and `rate_hz` readings per second; once, just before the control ticks start. A serial
+    /// encoder of an axis that is none of [`SERIAL_AXES`](Self::SERIAL_AXES) is refused before.
+    fn prepare(&mut self, _settings: &[EncoderSettings; 3], _rate_hz: u32) {}
+
     /// Reads all three; to be called once a tick. A counter narrower than 32 bits fills the low
     /// bits, and an index pulse is reported once.
     fn read(&mut self) -> [EncoderReading; 3];

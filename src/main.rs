@@ -143,7 +143,7 @@ mod app {
             intake,
             server,
             rate_hz,
-            resolution_mm,
+            encoders,
         } = boot::machine(cx.local.storage, board.flash, crashed, cycle_hz, NUMBER);
         defmt::info!("{=u32} control ticks per second, outputs off", rate_hz);
         let (requests_in, requests_out) = cx.local.requests.split();
@@ -159,6 +159,7 @@ mod app {
         let (lines_in, lines_out) = cx.local.lines.split();
         // First: it waits for its own clock, and the first tick would be late.
         board.watchdog.start();
+        board.encoders.prepare(&encoders, rate_hz);
         board.tick.start(rate_hz);
         let local = Local {
             control,
@@ -172,7 +173,7 @@ mod app {
             watchdog: board.watchdog,
             tick: board.tick,
             idle: board.idle,
-            supervision: Supervision::new(resolution_mm),
+            supervision: Supervision::new(encoders.map(|encoder| encoder.resolution_mm)),
             liveness: Liveness::new(rate_hz),
             requests_in,
             requests_out,

@@ -7,13 +7,13 @@ use core::mem::MaybeUninit;
 
 use quadrant::app::crash_record::CrashCause;
 use quadrant::app::{Axis, Control, ControlEnds, Intake, Server, ServerParts};
-use quadrant::hal::ResetCause;
+use quadrant::hal::{Encoders, ResetCause};
 use quadrant_law::axes::AxisName;
 use quadrant_law::safety::{FaultCode, Operation};
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::Plan;
 use quadrant_link::message::NumberType;
-use quadrant_settings::StageSettings;
+use quadrant_settings::{EncoderSettings, StageSettings};
 
 use self::settings::{Loaded, count_start, load};
 use crate::board::{self, SettingsFlash};
@@ -32,8 +32,8 @@ pub(crate) struct Machine<S: Scalar + 'static> {
     pub(crate) server: &'static mut Server<'static, 'static, S, SettingsFlash>,
     /// Control rate, Hz.
     pub(crate) rate_hz: u32,
-    /// Lengths of the encoders' counts, mm.
-    pub(crate) resolution_mm: [f64; 3],
+    /// The encoders.
+    pub(crate) encoders: [EncoderSettings; 3],
 }
 
 /// Loads the settings and makes the machine of them. `crashed` is the fault that the last run left; `cycle_hz` is the rate of the
@@ -68,10 +68,7 @@ pub(crate) fn machine<S: Scalar>(
         settings.build_axis_into(name, axis);
     }
     let rate_hz = settings.rate_hz as u32;
-    let resolution_mm = settings
-        .axes
-        .each_ref()
-        .map(|axis| axis.encoder.resolution_mm);
+    let encoders = settings.axes.each_ref().map(|axis| axis.encoder);
     let operation = settings.operation();
     let (control_ends, intake_ends, ends) = storage.queues.split();
     let control = place_control(
@@ -100,6 +97,7 @@ pub(crate) fn machine<S: Scalar>(
         cycle_hz,
         rates_hz: board::RATES_HZ,
         pulse_axes: board::PULSE_AXES,
+        serial_axes: <board::Encoders as Encoders>::SERIAL_AXES,
         number,
         log: board::TAKE_LOG,
     };
@@ -108,7 +106,7 @@ pub(crate) fn machine<S: Scalar>(
         intake: storage.intake.write(Intake::new(intake_ends)),
         server: place_server(&mut storage.server, parts),
         rate_hz,
-        resolution_mm,
+        encoders,
     }
 }
 

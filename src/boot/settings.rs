@@ -1,13 +1,14 @@
 //! The settings to start with: those in flash, or those of a job that a host has left.
 
 use quadrant::app::start_record::StartRecord;
+use quadrant::hal::Encoders;
 use quadrant::store::{BUFFER_BYTES, Finding, Store};
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::Plan;
 use quadrant_link::message::Provenance;
 use quadrant_settings::Job;
-use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
+use quadrant_settings::{AxisSettings, PlanSettings, SettingsError, StageSettings};
 
 use crate::board::{self, SettingsFlash};
 use crate::log;
@@ -67,7 +68,7 @@ pub(super) fn load<S: Scalar>(
                     } else if set_aside {
                         "three starts with them did not last"
                     } else {
-                        "the board is not up to their rate_hz, or counts no steps for an axis with pulses"
+                        "the board is not up to their rate_hz, counts no steps for an axis with pulses, or reads no serial encoder of an axis"
                     };
                     defmt::error!(
                         "settings number {=u32} are in the draft, and not in force: {=str}",
@@ -109,13 +110,16 @@ pub(crate) fn forget_starts() {
     board::start_record::write(StartRecord::default());
 }
 
-/// True if the board is up to the control rate, and counts the steps that axes are to follow.
+/// True if the board is up to the control rate, counts the steps that axes are to follow, and reads their serial encoders.
 fn is_possible(settings: &StageSettings) -> bool {
-    let follows = settings.axes.iter().map(|axis| axis.pulses.is_some());
+    let has_inputs = |(axis, (counts, reads)): (&AxisSettings, (bool, bool))| {
+        (counts || axis.pulses.is_none()) && (reads || axis.encoder.serial.is_none())
+    };
+    let inputs = board::PULSE_AXES
+        .into_iter()
+        .zip(<board::Encoders as Encoders>::SERIAL_AXES);
     (board::RATES_HZ.0..=board::RATES_HZ.1).contains(&settings.rate_hz)
-        && follows
-            .zip(board::PULSE_AXES)
-            .all(|(follows, counts)| counts || !follows)
+        && settings.axes.iter().zip(inputs).all(has_inputs)
 }
 
 /// Decodes the job that the board was given: its motions, and its settings into `settings`. Without a job, there is no

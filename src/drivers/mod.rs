@@ -7,6 +7,7 @@ pub mod dma_ring;
 pub mod hold_button;
 pub mod input_filter;
 pub mod reset_flags;
+pub mod serial_encoder;
 pub mod step_counter;
 pub mod switch_inputs;
 pub mod tick_interval;

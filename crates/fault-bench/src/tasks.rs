@@ -364,6 +364,7 @@ impl Tasks {
             cycle_hz: 0,
             rates_hz: (2.5e3, 1.5e4),
             pulse_axes: [true, false, false],
+            serial_axes: [true, false, false],
             number: NumberType::F32,
             log: Some(take_log),
         });

@@ -13,7 +13,8 @@ pub struct EncoderReading {
     pub index: Option<u32>,
     /// The reading was taken in this tick.
     pub fresh: bool,
-    /// No change of both lines at once was seen since the last tick.
+    /// The count is to be trusted: no change of both lines at once was seen since the last tick; a serial encoder's frame came
+    /// undamaged and without the encoder's error bit.
     pub valid: bool,
 }
 
@@ -48,13 +49,24 @@ impl Default for EncoderReading {
     }
 }
 
-/// An incremental encoder's counter.
+/// An encoder's counter.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Encoder {
     /// Bits that a count lies above the counter's own: 0 for a 32-bit counter, 16 for a 16-bit one.
     shift: u32,
     reversed: bool,
     largest_step: i32,
+    /// The place of an absolute encoder on the axis; none for an incremental one.
+    anchor: Option<Anchor>,
+}
+
+/// A place of which an absolute encoder's count is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Anchor {
+    /// The raw count there.
+    pub raw: u32,
+    /// The position there. Others are within half of the encoder's range of it.
+    pub position: Position,
 }
 
 /// The memory of an encoder.
@@ -64,6 +76,8 @@ pub struct EncoderState {
     /// Held as a position: one saturating sum serves both.
     position: Position,
     started: bool,
+    /// The last good reading of an absolute encoder whose position is not known yet.
+    seen: Option<u32>,
 }
 
 impl EncoderState {
@@ -91,7 +105,33 @@ impl Encoder {
             shift: 32 - counter_bits,
             reversed,
             largest_step,
+            anchor: None,
         }
+    }
+
+    /// The same, of an encoder that is absolute.
+    pub const fn with_anchor(self, anchor: Option<Anchor>) -> Self {
+        Self { anchor, ..self }
+    }
+
+    /// True if the encoder shows where the axis is.
+    #[inline(always)]
+    pub(crate) const fn is_absolute(&self) -> bool {
+        self.anchor.is_some()
+    }
+
+    /// The distance from the accumulated position to that of an absolute encoder, once two readings in a row agree. `good`: nothing is
+    /// wrong with the reading `raw`, which has been accumulated.
+    pub(crate) fn find(&self, state: &mut EncoderState, raw: u32, good: bool) -> Option<Position> {
+        let anchor = self.anchor?;
+        let before = state.seen.take();
+        let agrees = before.is_some_and(|before| self.is_plausible(self.between(before, raw)));
+        if !(good && agrees) {
+            state.seen = good.then_some(raw);
+            return None;
+        }
+        let position = anchor.position + Position::from_step(self.between(anchor.raw, raw));
+        Some(position - state.position)
     }
 
     /// The signed counts from one raw reading to another, towards larger positions.

@@ -7,6 +7,7 @@ use super::feedback::FeedbackSettings;
 use super::homing::HomingSettings;
 use super::limits::LimitSettings;
 use super::pulses::PulseSettings;
+use super::serial_encoder::SerialSettings;
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::plant_model::PlantModel;
 use quadrant_law::feedforward::{FeedforwardGains, FeedforwardKind};
@@ -42,13 +43,13 @@ pub struct AxisSettings {
     pub commissioned: bool,
 }
 
-/// An incremental encoder and its hardware counter.
+/// An encoder: A, B and index with a hardware counter, or a serial one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct EncoderSettings {
     /// Length of one count, mm.
     pub resolution_mm: f64,
-    /// Width of the hardware counter, bits.
+    /// Width of the hardware counter, or of a serial encoder's position, bits.
     pub counter_bits: u8,
     /// True if the counter runs backwards when the axis moves to larger positions.
     pub reversed: bool,
@@ -58,6 +59,12 @@ pub struct EncoderSettings {
     /// Distance, either way, by which an index pulse may miss its place, counts.
     #[serde(default = "index_tolerance_counts")]
     pub index_tolerance_counts: u32,
+    /// Position that a serial encoder shows where the axis is at zero, mm; none: the axis is homed as one with A, B and index.
+    #[serde(default)]
+    pub offset_mm: Option<f64>,
+    /// Serial encoder; none: A, B and index.
+    #[serde(default)]
+    pub serial: Option<SerialSettings>,
 }
 
 fn index_tolerance_counts() -> u32 {

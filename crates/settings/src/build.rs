@@ -200,12 +200,15 @@ impl AxisSettings {
         let gains = feedback.linear_gains();
         let cancelling = self.cancelling(gains.first());
         let built = AxisBuilder::new(axis, encoder.resolution_mm, period_s)
-            .encoder(Encoder::new(
-                encoder.counter_bits.into(),
-                encoder.reversed,
-                // One count more: a slow axis still steps by whole counts.
-                (rounding::ceil(largest_step) as i32 + 1).max(LEAST_STEP_COUNTS),
-            ))
+            .encoder(
+                Encoder::new(
+                    encoder.counter_bits.into(),
+                    encoder.reversed,
+                    // One count more: a slow axis still steps by whole counts.
+                    (rounding::ceil(largest_step) as i32 + 1).max(LEAST_STEP_COUNTS),
+                )
+                .with_anchor(self.build_anchor()),
+            )
             .output(OutputStage {
                 limit_v: amplifier.output_limit_v,
                 full_scale_v: amplifier.full_scale_v,

@@ -138,6 +138,8 @@ impl Default for EncoderSettings {
             reversed: false,
             counts_per_index: None,
             index_tolerance_counts: default!("encoder.index_tolerance_counts") as u32,
+            offset_mm: None,
+            serial: None,
         }
     }
 }

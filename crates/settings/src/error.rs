@@ -33,6 +33,15 @@ pub enum Reason {
     Missing,
     /// Homing by the index pulse needs to know the counts between two of them.
     IndexUnknown,
+    /// Only a serial encoder knows its position from the start.
+    NeedsSerial,
+    /// The axis is homed from the start, and homing by a switch would contradict it.
+    HomedTwice,
+    /// A serial encoder's count comes again within the travel.
+    BeyondRange {
+        /// Longest travel, mm.
+        most: f64,
+    },
     /// The loop that the law closes at small errors is not shown to be stable on the plant.
     Unstable,
     /// The axis counts as commissioned, and its law has no gain.
@@ -96,6 +105,18 @@ impl fmt::Display for SettingsError {
         match self.reason {
             Reason::Missing => f.write_str(" is missing, which the chosen law or kind of feedforward needs: `quadrant commission` fills it in"),
             Reason::NeedsPid => f.write_str(" needs feedback/law = \"pd\", \"pid\" or \"n-pid\"; choose one, or leave it out"),
+            Reason::NeedsSerial => f.write_str(
+                ": only a serial encoder shows its position from the start; give encoder/serial, or leave this out",
+            ),
+            Reason::HomedTwice => f.write_str(
+                ": the axis is homed from the start by it; leave this or homing out",
+            ),
+            Reason::BeyondRange { most } => write!(
+                f,
+                ": the travel is longer than the {} mm after which the serial encoder's count comes again; leave \
+                 encoder/offset_mm out, and home the axis by a switch",
+                Decimal(most)
+            ),
             Reason::IndexUnknown => f.write_str(
                 ": homing by the index pulse needs encoder/counts_per_index; give it, or home without the index",
             ),

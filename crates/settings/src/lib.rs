@@ -30,6 +30,7 @@ pub mod popov;
 pub mod presets;
 mod pulses;
 pub mod response;
+mod serial_encoder;
 mod stage;
 pub mod stream_planner;
 pub mod tree;
@@ -47,5 +48,6 @@ pub use operation::{
     BrakeSettings, EmergencyReaction, LossReaction, OperationSettings, StreamingSettings,
 };
 pub use pulses::PulseSettings;
+pub use serial_encoder::{CheckBit, SerialProtocol, SerialSettings};
 pub use stage::{Job, PlanSettings, StageSettings};
 pub use value::MAX_VALUE_BYTES;

@@ -7,6 +7,7 @@ use super::homing::{HomeSwitch, HomingSettings};
 use super::leaves::default;
 use super::limits::TravelSettings;
 use super::pulses::PulseSettings;
+use super::serial_encoder::SerialSettings;
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::cascade::CascadeGains;
 use quadrant_law::control::filter::FilterSettings;
@@ -44,12 +45,18 @@ macro_rules! part {
 }
 
 /// Every part that may be left out.
-pub static PARTS: [Part; 16] = [
+pub static PARTS: [Part; 18] = [
     part!(
         "/encoder/counts_per_index",
         encoder.counts_per_index,
         default!("encoder.counts_per_index") as u32
     ),
+    part!(
+        "/encoder/offset_mm",
+        encoder.offset_mm,
+        default!("encoder.offset_mm")
+    ),
+    part!("/encoder/serial", encoder.serial, SerialSettings::default()),
     part!(
         "/feedback/nonlinear",
         feedback.nonlinear,

@@ -7,6 +7,7 @@ use core::any::Any;
 
 use super::homing::HomeSwitch;
 use super::operation::{EmergencyReaction, LossReaction};
+use super::serial_encoder::{CheckBit, SerialProtocol};
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::filter::FilterList;
 use quadrant_law::control::nctf::Characteristic;
@@ -142,7 +143,7 @@ pub(crate) fn number(leaf: &dyn Any) -> Option<f64> {
 plain!(1 GmsElements, 1 GainSchedule, 1 Characteristic, 1 FilterList, 2 bool, 4 f64, 5 u8, 7 u32);
 name!(
     3 LawKind, 3 FeedforwardKind, 3 Direction, 3 HomeSwitch, 3 LossReaction, 3 EmergencyReaction, 3 EnabledBy,
-    3 HostNeeded
+    3 HostNeeded, 3 SerialProtocol, 3 CheckBit
 );
 each!(
     f64,
@@ -155,6 +156,8 @@ each!(
     EmergencyReaction,
     EnabledBy,
     HostNeeded,
+    SerialProtocol,
+    CheckBit,
     LawKind,
     FeedforwardKind,
     GmsElements,

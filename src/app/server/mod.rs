@@ -87,6 +87,8 @@ pub struct ServerParts<'q, 'a, S: Scalar, F> {
     pub rates_hz: (f64, f64),
     /// The axes whose steps of another control the board counts.
     pub pulse_axes: [bool; 3],
+    /// The axes of which the board reads a serial encoder.
+    pub serial_axes: [bool; 3],
     /// The number type of the control law.
     pub number: NumberType,
     /// The way to the board's log; none if the link cannot show it.
@@ -141,6 +143,7 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     cycle_hz: u32,
     rates_hz: (f64, f64),
     pulse_axes: [bool; 3],
+    serial_axes: [bool; 3],
     number: NumberType,
     take_log: Option<TakeLog>,
     log: LogRing,
@@ -199,6 +202,7 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
             cycle_hz: parts.cycle_hz,
             rates_hz: parts.rates_hz,
             pulse_axes: parts.pulse_axes,
+            serial_axes: parts.serial_axes,
             number: parts.number,
             take_log: parts.log,
             log: LogRing::new(),

@@ -154,11 +154,19 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         }))
     }
 
-    /// Checks that the board is up to the draft's control rate and counts the pulses that axes are to follow.
+    /// Checks that the board is up to the draft's control rate, counts the pulses that axes are to follow, and reads their serial
+    /// encoders.
     fn check_board(&self) -> Result<(), LinkError> {
         self.check_rate()?;
         for name in AxisName::ALL {
-            let follows = self.draft.settings().axis(name).pulses.is_some();
+            let axis = self.draft.settings().axis(name);
+            if axis.encoder.serial.is_some() && !self.serial_axes[index(name)] {
+                return Err(invalid(format_args!(
+                    "{name}/encoder/serial: this board reads no serial encoder of the axis; leave the part out, or use an axis that it \
+                     reads one of (docs/serial-encoders.md)"
+                )));
+            }
+            let follows = axis.pulses.is_some();
             if follows && !self.pulse_axes[index(name)] {
                 return Err(invalid(format_args!(
                     "{name}/pulses: this board counts no steps for the axis; leave the part out, or use an axis that it counts \

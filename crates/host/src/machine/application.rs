@@ -144,6 +144,7 @@ pub fn start_halves<S: Scalar>(
             cycle_hz: identity.cycle_hz,
             rates_hz: RATES_HZ,
             pulse_axes: [false; 3],
+            serial_axes: [false; 3],
             number: identity.number,
             log: None,
         }),

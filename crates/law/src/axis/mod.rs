@@ -236,6 +236,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             && watched.is_ok()
             && self.encoder.is_plausible(counts)
             && self.is_slow(state)
+            && (state.homed || !self.encoder.is_absolute())
             && reading.is_plain();
         if !usual {
             return self.examine(state, reading, counts, alive, watched);
@@ -269,6 +270,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     ) -> Result<(), FaultCode> {
         let possible = self.encoder.is_plausible(counts);
         let slow = self.is_slow(state);
+        if !state.homed {
+            self.find_position(state, reading);
+        }
         let indexed = match reading.index {
             Some(raw) => self.take_pulse(state, raw),
             None => true,
@@ -301,6 +305,18 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         } else {
             return watched;
         })
+    }
+
+    /// Takes the position of an absolute encoder. An axis outside its travel counts as homed once it is inside: another encoder may
+    /// have been fitted.
+    fn find_position(&self, state: &mut AxisState<S, N>, reading: &EncoderReading) {
+        let (raw, good) = (reading.count, reading.is_good());
+        if let Some(offset) = self.encoder.find(&mut state.encoder, raw, good) {
+            if offset != Position::ZERO {
+                Self::shift(state, offset);
+            }
+            state.homed = self.travel.holds(state.encoder.position());
+        }
     }
 
     /// Compares the encoder with the plant, and watches the load.

@@ -84,6 +84,11 @@ impl Travel {
         self.clear.holds(reference) && self.allowed.holds(measured)
     }
 
+    /// True if a position is inside the travel.
+    pub(crate) const fn holds(&self, measured: Position) -> bool {
+        self.allowed.holds(measured)
+    }
+
     /// Takes the reference, its displacement in this tick, and the measured position. A fault that is found calls for a
     /// stop along `ramp`.
     pub fn step<S: Scalar>(

@@ -61,8 +61,8 @@ fn leaves(value: &Value, path: &str, found: &mut Vec<String>) {
     match value {
         Value::Object(fields) => {
             // On an axis of which the runs here know the plant, they act: `learning.rs`, `cancelling.rs`. Pulses act
-            // where a board counts them.
-            let known = ["learning", "cancelling", "pulses"];
+            // where a board counts them; an offset of a serial encoder, where a board reads one (`absolute_encoder.rs`).
+            let known = ["learning", "cancelling", "pulses", "serial", "offset_mm"];
             for (name, value) in fields
                 .iter()
                 .filter(|(name, _)| !known.contains(&name.as_str()))

@@ -1,5 +1,6 @@
 //! The control law on the host: every part against its definition, and the whole tick against its promises.
 
+mod absolute_encoder;
 mod admission_exhaustive;
 mod anti_windup;
 mod axis_alone;

@@ -5,6 +5,7 @@ use strum::VariantNames;
 use super::row::{Exchange, LeafInfo, UNSET, at, exchanged, flag, name, number, of_stage, times};
 use crate::axis::AxisSettings;
 use crate::operation::{EmergencyReaction, LossReaction};
+use crate::serial_encoder::{CheckBit, SerialProtocol};
 use quadrant_law::safety::{EnabledBy, HostNeeded};
 
 pub(super) fn full_scale_v(axis: &AxisSettings, _: f64) -> f64 {
@@ -71,7 +72,7 @@ pub(super) const ENCODER: &[LeafInfo] = &exchanged(Exchange::Restart, [
     number("encoder.resolution_mm", "mm", at(1e-6), at(1.0), 5e-4,
         "Length of one count of the encoder. Changes with a restart, as all of the encoder."),
     number("encoder.counter_bits", "bit", at(8.0), at(32.0), 32.0,
-        "Width of the hardware counter."),
+        "Width of the hardware counter, or of a serial encoder's position."),
     flag("encoder.reversed",
         "True if the counter runs backwards when the axis moves to larger positions."),
     number("encoder.counts_per_index", "counts", at(16.0), at(1e9), UNSET,
@@ -79,6 +80,16 @@ pub(super) const ENCODER: &[LeafInfo] = &exchanged(Exchange::Restart, [
     number("encoder.index_tolerance_counts", "counts",
         at(0.0), times(1.0, "a quarter of the index spacing", most_index_tolerance), 4.0,
         "Distance, either way, by which an index pulse may miss its place."),
+    number("encoder.offset_mm", "mm", at(-1e5), at(1e5), 0.0,
+        "Position that a serial encoder shows where the axis is at zero: it is homed from the start. Left out: it is homed by switch."),
+    name("encoder.serial.protocol", SerialProtocol::VARIANTS,
+        "Protocol of a serial encoder in the place of A, B and index; left out with its part, there is none."),
+    number("encoder.serial.clock_hz", "Hz", at(1e5), at(1e7), 3e6,
+        "Largest clock of the serial encoder and its cable; the board takes the next below that it has."),
+    flag("encoder.serial.gray",
+        "True if the position of SSI comes in Gray code."),
+    name("encoder.serial.check_bit", CheckBit::VARIANTS,
+        "Bit behind the position of SSI: none, a parity of position and bit, or the encoder's error (active high)."),
 ]);
 
 #[rustfmt::skip]

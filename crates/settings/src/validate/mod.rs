@@ -65,6 +65,9 @@ impl StageSettings {
     }
 }
 
+/// Longest travel over the length after which a serial encoder's count comes again.
+const MOST_RANGE_SHARE: f64 = 0.9;
+
 /// Settings of a law that no other law reads.
 const OF_A_LAW: [(&str, LawKind); 5] = [
     ("feedback.nonlinear", LawKind::NPid),
@@ -120,7 +123,37 @@ impl AxisSettings {
         }
         self.validate_homing(at)?;
         self.validate_feedback(at, period_s)?;
-        self.validate_friction(at, period_s, elements)
+        self.validate_friction(at, period_s, elements)?;
+        self.validate_offset(at)
+    }
+
+    /// A position from the start is that of a serial encoder, of no other homing, and of one place in the travel alone.
+    fn validate_offset(&self, at: Place) -> Result<(), SettingsError> {
+        const OFFSET: &str = "encoder.offset_mm";
+        let encoder = &self.encoder;
+        let Some(offset_mm) = encoder.offset_mm else {
+            return Ok(());
+        };
+        if encoder.serial.is_none() {
+            return at.refuse(OFFSET, offset_mm, Reason::NeedsSerial);
+        }
+        if self.homing.is_some() {
+            return at.refuse(OFFSET, offset_mm, Reason::HomedTwice);
+        }
+        let Some(travel) = self.limits.travel_mm else {
+            return Ok(());
+        };
+        // Some way remains on either side for an axis that is beyond its travel.
+        let most =
+            MOST_RANGE_SHARE * libm::scalbn(encoder.resolution_mm, encoder.counter_bits.into());
+        if travel.positive - travel.negative > most {
+            return at.refuse(
+                "limits.travel_mm.positive",
+                travel.positive,
+                Reason::BeyondRange { most },
+            );
+        }
+        Ok(())
     }
 
     fn validate_homing(&self, at: Place) -> Result<(), SettingsError> {

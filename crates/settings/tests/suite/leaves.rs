@@ -8,7 +8,7 @@ use quadrant_law::control::filter::{FilterList, FilterSettings};
 use quadrant_law::learning::LearningSettings;
 use quadrant_settings::leaves::{LeafInfo, Range, all, find};
 use quadrant_settings::tree::{TreeError, is_part};
-use quadrant_settings::{PulseSettings, Reason, SettingsError, StageSettings};
+use quadrant_settings::{PulseSettings, Reason, SerialSettings, SettingsError, StageSettings};
 use serde_json::Value;
 
 use quadrant_test_support::{get, is_whole, paths};
@@ -21,6 +21,8 @@ fn settings() -> StageSettings {
     for axis in &mut settings.axes {
         axis.feedforward.learning = Some(LearningSettings::default());
         axis.feedforward.cancelling = Some(CancellingSettings::default());
+        axis.encoder.serial = Some(SerialSettings::default());
+        axis.encoder.offset_mm = Some(0.0);
         axis.pulses = Some(PulseSettings {
             step_mm: 5e-3,
             ..PulseSettings::default()

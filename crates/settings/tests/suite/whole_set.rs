@@ -4,7 +4,8 @@ use quadrant_law::axes::AxisName;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::decimal::Decimal;
 use quadrant_settings::{
-    FeedbackSettings, PlanSettings, PulseSettings, Reason, SettingsError, StageSettings,
+    AxisSettings, FeedbackSettings, PlanSettings, PulseSettings, Reason, SerialSettings,
+    SettingsError, StageSettings, TravelSettings,
 };
 
 use crate::fields::{FIELDS, number};
@@ -141,6 +142,62 @@ fn the_spacing_of_the_index_and_its_tolerance_have_ranges() {
     let error = refusal(&with_x(|axis| axis.encoder.counts_per_index = None));
     check_message(&error, AxisName::X, "homing.index");
     assert!(error.to_string().contains("encoder/counts_per_index"));
+}
+
+#[test]
+fn a_position_from_the_start_is_that_of_a_serial_encoder_alone_and_of_one_place_in_the_travel() {
+    let with = |change: fn(&mut AxisSettings)| {
+        with_x(|axis| {
+            axis.homing = None;
+            axis.encoder.counter_bits = 20;
+            axis.encoder.serial = Some(SerialSettings::default());
+            axis.encoder.offset_mm = Some(12.5);
+            // 20 bits of 0.5 um are 524.3 mm.
+            axis.limits.travel_mm = Some(TravelSettings {
+                negative: -71.0,
+                positive: 400.0,
+            });
+            change(axis);
+        })
+    };
+    assert_eq!(with(|_| {}).validate(ROOM), Ok(()));
+    assert_eq!(
+        with(|axis| axis.limits.travel_mm = None).validate(ROOM),
+        Ok(())
+    );
+    type Change = fn(&mut AxisSettings);
+    let refused: [(Change, &str, &str); 4] = [
+        (
+            |axis| axis.encoder.serial = None,
+            "encoder.offset_mm",
+            "give encoder/serial",
+        ),
+        (
+            |axis| axis.homing = StageSettings::simulated().axes[0].homing,
+            "encoder.offset_mm",
+            "leave this or homing out",
+        ),
+        (
+            |axis| axis.encoder.counter_bits = 19,
+            "limits.travel_mm.positive",
+            "the travel is longer than the 235.9",
+        ),
+        (
+            |axis| {
+                axis.encoder.serial = Some(SerialSettings {
+                    clock_hz: 1.1e7,
+                    ..SerialSettings::default()
+                });
+            },
+            "encoder.serial.clock_hz",
+            "is outside",
+        ),
+    ];
+    for (change, field, says) in refused {
+        let error = refusal(&with(change));
+        check_message(&error, AxisName::X, field);
+        assert!(error.to_string().contains(says), "{error}");
+    }
 }
 
 #[test]

@@ -1,0 +1,391 @@
+//! Frames of serial encoders, made bit by bit as an encoder puts them out.
+
+use proptest::prelude::*;
+use quadrant::drivers::serial_encoder::{
+    BRIDGE_AFTER, Content, Flaw, FrameCounts, SerialEncoder, biss, frame_bytes, ssi,
+};
+use quadrant_law::encoder::EncoderReading;
+use quadrant_settings::{CheckBit, SerialProtocol, SerialSettings};
+
+/// The line's levels in the order of their bits, low behind them.
+fn shifted_in(levels: &[u8]) -> u64 {
+    assert!(levels.len() <= 64);
+    levels
+        .iter()
+        .chain(core::iter::repeat(&0))
+        .take(64)
+        .fold(0, |word, level| word << 1 | u64::from(*level))
+}
+
+fn levels(value: u64, bits: u32) -> impl Iterator<Item = u8> {
+    (0..bits).rev().map(move |bit| (value >> bit & 1) as u8)
+}
+
+/// The six stages of the shift register in data sheets of encoders with BiSS-C: x^6 + x + 1, the output inverted.
+fn shift_register(levels: &[u8]) -> u64 {
+    let mut stages = [0_u8; 6];
+    for level in levels {
+        let feedback = level ^ stages[5];
+        stages = [
+            feedback,
+            stages[0] ^ feedback,
+            stages[1],
+            stages[2],
+            stages[3],
+            stages[4],
+        ];
+    }
+    let inverted = stages.iter().rev().map(|stage| 1 - stage);
+    inverted.fold(0, |word, bit| word << 1 | u64::from(bit))
+}
+
+/// A frame of BiSS-C.
+#[derive(Clone, Copy, Debug)]
+struct Frame {
+    rest: usize,
+    acknowledge: usize,
+    cds: u8,
+    count: u32,
+    bits: u32,
+    error: bool,
+    warning: bool,
+}
+
+const FRAME: Frame = Frame {
+    rest: 2,
+    acknowledge: 3,
+    cds: 0,
+    count: 0x2_1234,
+    bits: 26,
+    error: false,
+    warning: false,
+};
+
+impl Frame {
+    fn shifted_in(&self) -> u64 {
+        let mut content: Vec<u8> = levels(self.count.into(), self.bits).collect();
+        content.extend([u8::from(!self.error), u8::from(!self.warning)]);
+        let crc = shift_register(&content);
+        let mut line = vec![1; self.rest];
+        line.extend(vec![0; self.acknowledge]);
+        line.extend([1, self.cds]);
+        line.extend(content);
+        line.extend(levels(crc, 6));
+        shifted_in(&line)
+    }
+}
+
+fn biss_c() -> SerialSettings {
+    SerialSettings::default()
+}
+
+fn whole(count: u32) -> EncoderReading {
+    EncoderReading::of(count)
+}
+
+fn with_count(count: u32) -> u64 {
+    Frame { count, ..FRAME }.shifted_in()
+}
+
+/// An encoder that has sent enough whole frames at this count that one is bridged.
+fn proven(settings: &SerialSettings, bits: u32, received: u64) -> SerialEncoder {
+    let mut encoder = SerialEncoder::new(settings, bits);
+    for _ in 0..=BRIDGE_AFTER {
+        encoder.take(Some(received));
+    }
+    assert!(encoder.take(Some(received)).valid);
+    encoder
+}
+
+#[test]
+fn the_check_sum_is_that_of_published_vectors() {
+    // Two bytes and cleared status bits give 0x1a, all of 0xfedcba (status 10) 0x32, and zeros 0x3f.
+    let vectors = [(0x1234, 16, 0b00, 0x1a), (0x3f_b72e, 22, 0b10, 0x32)];
+    for (count, bits, status, crc) in vectors {
+        let mut content: Vec<u8> = levels(count, bits).collect();
+        content.extend(levels(status, 2));
+        assert_eq!(shift_register(&content), crc);
+        let mut line = vec![1, 0, 1, 0];
+        line.extend(content);
+        line.extend(levels(crc, 6));
+        let decoded = biss::decode(shifted_in(&line), bits as u32);
+        if status == 0 {
+            assert_eq!(decoded, Err(Flaw::Error));
+        } else {
+            let expected = Content {
+                count: count as u32,
+                warning: true,
+                start: 2,
+            };
+            assert_eq!(decoded, Ok(expected));
+        }
+    }
+    assert_eq!(shift_register(&[0; 36]), 0x3f);
+}
+
+proptest! {
+    #[test]
+    fn every_frame_comes_back(
+        rest in 1_usize..6, acknowledge in 1_usize..12, cds in 0_u8..2, bits in 18_u32..=32, value: u32, warning: bool,
+    ) {
+        let count = value >> (32 - bits);
+        let frame = Frame { rest, acknowledge, cds, count, bits, error: false, warning };
+        let expected = Content { count, warning, start: (rest + acknowledge) as u32 };
+        prop_assert_eq!(biss::decode(frame.shifted_in(), bits), Ok(expected));
+        let failing = Frame { error: true, ..frame };
+        prop_assert_eq!(biss::decode(failing.shifted_in(), bits), Err(Flaw::Error));
+    }
+
+    #[test]
+    fn whatever_comes_is_decoded_or_refused(received: u64, bits: u32) {
+        // No panic, and no count beyond its width.
+        for decoded in [biss::decode(received, bits), ssi::decode(received, bits, true, CheckBit::OddParity)] {
+            if let Ok(content) = decoded {
+                prop_assert!(bits >= 32 || u64::from(content.count) < 1 << bits);
+            }
+        }
+    }
+
+    #[test]
+    fn one_or_two_wrong_bits_never_become_another_count(value: u32, bits in 18_u32..=32, acknowledge in 1_usize..5) {
+        let count = value >> (32 - bits);
+        let frame = Frame { count, bits, acknowledge, ..FRAME }.shifted_in();
+        let mut known = SerialEncoder::new(&biss_c(), bits);
+        known.take(Some(frame));
+        prop_assert_eq!(known.take(Some(frame)), whole(count));
+        for first in 0..64 {
+            for second in first..64 {
+                let wrong = if first == second { 1 << first } else { 1 << first | 1_u64 << second };
+                let reading = known.clone().take(Some(frame ^ wrong));
+                // A bit at rest, of the acknowledge or CDS may be wrong without harm.
+                prop_assert!(!reading.valid || reading.count == count, "{wrong:#x}");
+            }
+        }
+    }
+
+    #[test]
+    fn one_wrong_bit_of_a_word_with_parity_is_found(value: u32, bits in 18_u32..=32, odd: bool) {
+        let count = value >> (32 - bits);
+        let check = if odd { CheckBit::OddParity } else { CheckBit::EvenParity };
+        let word = word(count, bits, Some(u8::from((count.count_ones() % 2 == 1) != odd)));
+        prop_assert_eq!(ssi::decode(word, bits, false, check).map(|content| content.count), Ok(count));
+        // The bits of rest, position and parity, and the one behind them.
+        for place in 0..bits + 3 {
+            prop_assert!(ssi::decode(word ^ 1 << (63 - place), bits, false, check).is_err(), "{place}");
+        }
+    }
+}
+
+#[test]
+fn a_frame_that_does_not_fit_or_a_dead_line_is_no_frame() {
+    for bits in [18, 26, 32] {
+        assert_eq!(biss::decode(0, bits), Err(Flaw::Line));
+        assert_eq!(biss::decode(u64::MAX, bits), Err(Flaw::Line));
+    }
+    // The last bit must show the time-out.
+    let late = |acknowledge| Frame {
+        acknowledge,
+        ..FRAME
+    };
+    let room = 64 - (2 + 2 + 26 + 8 + 1);
+    assert!(biss::decode(late(room).shifted_in(), 26).is_ok());
+    let cut = late(room + 1).shifted_in();
+    assert_eq!(biss::decode(cut, 26), Err(Flaw::Line));
+    // Cut off in the middle of the frame: the wire breaks and the receiver shows high, or low.
+    let frame = with_count(0x155_5555);
+    for place in 6..38 {
+        let behind = u64::MAX >> place;
+        assert!(biss::decode(frame | behind, 26).is_err(), "{place}");
+        let low = biss::decode(frame & !behind, 26);
+        assert_ne!(low.map(|content| content.count).unwrap_or(0x155_5555), 0);
+    }
+}
+
+#[test]
+fn all_ones_and_all_zeros_are_counts_like_others() {
+    for count in [0, 0x3ff_ffff] {
+        let decoded = biss::decode(with_count(count), 26);
+        assert_eq!(decoded.map(|content| content.count), Ok(count));
+        let decoded = ssi::decode(word(count, 26, None), 26, false, CheckBit::None);
+        assert_eq!(decoded.map(|content| content.count), Ok(count));
+    }
+}
+
+#[test]
+fn a_reading_is_valid_from_the_second_frame_on() {
+    let mut encoder = SerialEncoder::new(&biss_c(), 26);
+    assert!(!encoder.take(Some(with_count(7))).valid);
+    assert_eq!(encoder.take(Some(with_count(8))), whole(8));
+    assert_eq!(encoder.age(), 0);
+}
+
+#[test]
+fn one_damaged_frame_goes_on_with_the_last_step_across_the_wrap() {
+    let mut encoder = proven(&biss_c(), 26, with_count(0x3ff_fff0));
+    assert_eq!(
+        encoder.take(Some(with_count(0x3ff_fffa))),
+        whole(0x3ff_fffa)
+    );
+    // Ten counts on.
+    assert_eq!(encoder.take(Some(with_count(9) ^ 1 << 30)), whole(4));
+    assert_eq!(encoder.age(), 1);
+    assert_eq!(encoder.take(Some(with_count(14))), whole(14));
+    let expected = FrameCounts {
+        check_sum: 1,
+        bridged: 1,
+        // The first.
+        moved: 1,
+        ..FrameCounts::default()
+    };
+    assert_eq!(encoder.counts(), expected);
+}
+
+#[test]
+fn a_second_damaged_frame_is_not_bridged_before_many_whole_ones() {
+    let damaged = Some(with_count(5) ^ 1 << 30);
+    let good = Some(with_count(5));
+    let mut encoder = proven(&biss_c(), 26, with_count(5));
+    assert!(encoder.take(damaged).valid);
+    assert!(!encoder.take(damaged).valid, "in a row");
+    for _ in 0..BRIDGE_AFTER - 1 {
+        assert!(encoder.take(good).valid);
+    }
+    assert!(!encoder.take(damaged).valid, "one frame too early");
+    for _ in 0..BRIDGE_AFTER {
+        assert!(encoder.take(good).valid);
+    }
+    assert!(encoder.take(damaged).valid);
+}
+
+#[test]
+fn the_encoders_own_error_is_never_bridged_and_its_warning_is_counted() {
+    let mut encoder = proven(&biss_c(), 26, FRAME.shifted_in());
+    let warning = Frame {
+        warning: true,
+        ..FRAME
+    };
+    assert_eq!(encoder.take(Some(warning.shifted_in())), whole(FRAME.count));
+    let failing = Frame {
+        error: true,
+        count: 0,
+        ..FRAME
+    };
+    let reading = encoder.take(Some(failing.shifted_in()));
+    // The count stays.
+    let expected = EncoderReading {
+        valid: false,
+        ..whole(FRAME.count)
+    };
+    assert_eq!(reading, expected);
+    let counts = encoder.counts();
+    assert_eq!((counts.errors, counts.warnings, counts.bridged), (1, 1, 0));
+}
+
+#[test]
+fn a_frame_that_did_not_come_in_time_is_not_fresh() {
+    let mut encoder = proven(&biss_c(), 26, FRAME.shifted_in());
+    let expected = EncoderReading {
+        fresh: false,
+        ..whole(FRAME.count)
+    };
+    assert_eq!(encoder.take(None), expected);
+    assert_eq!(encoder.take(None), expected);
+    assert_eq!((encoder.counts().late, encoder.age()), (2, 2));
+}
+
+#[test]
+fn an_encoder_that_acknowledges_for_longer_than_before_is_believed_the_second_time() {
+    let mut encoder = proven(&biss_c(), 26, FRAME.shifted_in());
+    let later = Frame {
+        acknowledge: 4,
+        count: FRAME.count + 1,
+        ..FRAME
+    };
+    // The first is bridged.
+    assert_eq!(encoder.take(Some(later.shifted_in())), whole(FRAME.count));
+    assert_eq!(
+        encoder.take(Some(later.shifted_in())),
+        whole(FRAME.count + 1)
+    );
+}
+
+/// A word of SSI: rest, position, a check bit, and low until the monoflop ends.
+fn word(value: u32, bits: u32, check: Option<u8>) -> u64 {
+    let mut line = vec![1];
+    line.extend(levels(value.into(), bits));
+    line.extend(check);
+    shifted_in(&line)
+}
+
+#[test]
+fn gray_code_changes_one_bit_from_number_to_number() {
+    // From the definition: neighbours differ in one bit, and all numbers are met once, around the end too.
+    let mut gray = 0_u32;
+    for number in 0..1_u32 << 18 {
+        assert_eq!(ssi::from_gray(gray), number);
+        gray ^= 1 << (number + 1).trailing_zeros().min(17);
+    }
+    assert_eq!(gray, 0, "around");
+    assert_eq!(ssi::from_gray(u32::MAX), 0xaaaa_aaaa);
+}
+
+#[test]
+fn a_word_of_ssi_is_read_in_binary_and_in_gray() {
+    for bits in 18..=32 {
+        let number = 0x9234_5678_u32 >> (32 - bits);
+        let binary = ssi::decode(word(number, bits, None), bits, false, CheckBit::None);
+        assert_eq!(binary.map(|content| content.count), Ok(number));
+        // The reflected code of a number is the sum without carry of it and its half.
+        let gray = ssi::decode(
+            word(number ^ number / 2, bits, None),
+            bits,
+            true,
+            CheckBit::None,
+        );
+        assert_eq!(gray.map(|content| content.count), Ok(number));
+    }
+}
+
+#[test]
+fn a_broken_wire_of_ssi_shows_at_rest_or_behind_the_word() {
+    for check in [CheckBit::None, CheckBit::EvenParity, CheckBit::Error] {
+        for gray in [false, true] {
+            assert_eq!(ssi::decode(0, 25, gray, check), Err(Flaw::Line));
+            assert_eq!(ssi::decode(u64::MAX, 25, gray, check), Err(Flaw::Line));
+        }
+    }
+    let settings = SerialSettings {
+        protocol: SerialProtocol::Ssi,
+        gray: true,
+        ..SerialSettings::default()
+    };
+    let mut encoder = proven(&settings, 25, word(1234, 25, None));
+    let last = encoder.take(Some(word(1234, 25, None))).count;
+    assert_eq!(encoder.take(Some(u64::MAX)), whole(last), "bridged");
+    assert!(!encoder.take(Some(u64::MAX)).valid);
+    assert_eq!(encoder.counts().line, 2);
+}
+
+#[test]
+fn the_bytes_of_a_frame_hold_it() {
+    for bits in 18..=32 {
+        assert_eq!(frame_bytes(SerialProtocol::BissC, bits), 8);
+        let needed = 1 + bits + 1 + 1;
+        let clocked = 8 * frame_bytes(SerialProtocol::Ssi, bits) as u32;
+        assert!((needed..needed + 8).contains(&clocked));
+    }
+}
+
+#[test]
+fn the_error_bit_of_ssi_is_the_encoders_own() {
+    let decode = |level| ssi::decode(word(77, 25, Some(level)), 25, false, CheckBit::Error);
+    assert_eq!(decode(0).map(|content| content.count), Ok(77));
+    assert_eq!(decode(1), Err(Flaw::Error));
+}
+
+#[test]
+fn before_the_first_frame_the_age_is_the_largest() {
+    let mut encoder = SerialEncoder::new(&biss_c(), 26);
+    encoder.take(None);
+    assert_eq!(encoder.age(), u32::MAX);
+}
