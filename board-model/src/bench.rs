@@ -36,6 +36,8 @@ pub struct Subject {
     pub image: PathBuf,
     /// The board.
     pub board: &'static Wiring,
+    /// Instructions a second of virtual time. The models count instructions.
+    pub instructions_per_s: u64,
 }
 
 /// Request of the scenario to the model's thread.
@@ -592,7 +594,7 @@ fn run(
             .map_err(|e| text(&e))?,
         );
     }
-    let board = Nucleo::new(image.board, chip, line, hse_hz).map_err(|e| text(&e))?;
+    let board = Nucleo::new(image, chip, line, hse_hz).map_err(|e| text(&e))?;
     let session = Session::new(Box::new(board), 0, VirtualNanos(0)).map_err(|e| text(&e))?;
     let world = World {
         wiring: image.board,

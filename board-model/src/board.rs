@@ -16,6 +16,7 @@ use rigless::soc::{Error, Width};
 use rigless::time::VirtualNanos;
 
 use crate::ad5754r::{End, Shared, Wire};
+use crate::bench::Subject;
 use crate::wiring::{At, Family, TimerModel, Wiring};
 
 /// Rate that the debug probe feeds to OSC_IN, Hz.
@@ -82,6 +83,7 @@ pub enum Chip {
 #[derive(Debug)]
 pub struct Nucleo {
     chip: Chip,
+    instructions_per_s: u64,
     /// Its wiring.
     pub wiring: &'static Wiring,
 }
@@ -125,11 +127,12 @@ macro_rules! fit {
 impl Nucleo {
     /// A board with a converter, a link's line and a rate at OSC_IN, Hz.
     pub fn new(
-        wiring: &'static Wiring,
+        subject: &Subject,
         converter: &Shared,
         line: &SharedLine,
         hse_hz: u64,
     ) -> Result<Self, Error> {
+        let wiring = subject.board;
         let chip = match wiring.family {
             Family::F4 => {
                 let mut chip = Box::new(Stm32f427::new()?);
@@ -142,7 +145,11 @@ impl Nucleo {
                 Chip::H7(chip)
             }
         };
-        Ok(Self { chip, wiring })
+        Ok(Self {
+            chip,
+            wiring,
+            instructions_per_s: subject.instructions_per_s,
+        })
     }
 
     /// The level of a pin.
@@ -361,8 +368,7 @@ impl Board for Nucleo {
             interrupt_lines: NonZeroU32::new(u32::from(lines)).expect("lines"),
             priority_bits: 4,
             refclk_divider: NonZeroU32::new(8).expect("a divider"),
-            instructions_per_second: NonZeroU64::new(self.wiring.instructions_per_s)
-                .expect("a rate"),
+            instructions_per_second: NonZeroU64::new(self.instructions_per_s).expect("a rate"),
             boot: "flash",
         };
         match &mut self.chip {

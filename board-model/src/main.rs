@@ -64,9 +64,11 @@ fn main() -> ExitCode {
         .iter()
         .filter(|s| options.only.is_empty() || options.only.iter().any(|n| n == s.name));
     let board = BOARDS.into_iter().find(|board| board.name == options.board);
+    let board = board.unwrap_or(BOARDS[0]);
     let image = Subject {
         image: options.image.unwrap_or_default(),
-        board: board.unwrap_or(BOARDS[0]),
+        board,
+        instructions_per_s: board.instructions_per_s,
     };
     log::SHOWN.store(options.log, Ordering::Relaxed);
     let started = Instant::now();

@@ -48,7 +48,7 @@ pub struct Wiring {
     pub family: Family,
     /// Clock of the core, Hz.
     pub core_hz: u64,
-    /// Instructions a second of virtual time. The models count instructions.
+    /// Instructions a second of virtual time, unless a scenario needs more.
     pub instructions_per_s: u64,
     /// SYSCLK/HCLK/PCLK1/PCLK2/timers 1/timers 2, MHz.
     pub clocks_mhz: &'static str,

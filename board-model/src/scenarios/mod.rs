@@ -117,8 +117,9 @@ fn enable(bench: &mut Bench, client: &mut Client) -> Result<()> {
     let state = client.status(bench)?.state;
     ensure!(
         state == MachineState::Enabled,
-        "enabled, but the state is {}",
-        state.as_str()
+        "enabled, but the state is {}; log: {:?}",
+        state.as_str(),
+        bench.log().last()
     );
     Ok(())
 }
