@@ -15,9 +15,9 @@ const VELOCITY: f64 = 20.0;
 
 pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
     let rate_hz = image.board.fastest_hz;
-    // Two cycles each, which calculation says are fewer (docs/tick.md).
+    // Two cycles each at most.
     let image = &Subject {
-        instructions_per_s: image.board.core_hz / 2,
+        instructions_per_s: image.instructions_per_s.max(image.board.core_hz / 2),
         ..image.clone()
     };
     let mut bench = started(image, Some(&commissioned(image)?))?;
