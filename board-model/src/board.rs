@@ -16,6 +16,7 @@ use rigless::soc::{Error, Width};
 use rigless::time::VirtualNanos;
 
 use crate::ad5754r::{End, Shared, Wire};
+use crate::biss::{CableEnd, SharedEncoder};
 use crate::wiring::{At, Family, TimerModel, Wiring};
 
 /// Rate that the debug probe feeds to OSC_IN, Hz.
@@ -123,17 +124,20 @@ macro_rules! fit {
 }
 
 impl Nucleo {
-    /// A board with a converter, a link's line and a rate at OSC_IN, Hz.
+    /// A board with a converter, a link's line, a serial encoder where it has an input for it, and a rate at OSC_IN, Hz.
     pub fn new(
         wiring: &'static Wiring,
         converter: &Shared,
         line: &SharedLine,
+        encoder: &SharedEncoder,
         hse_hz: u64,
     ) -> Result<Self, Error> {
         let chip = match wiring.family {
             Family::F4 => {
                 let mut chip = Box::new(Stm32f427::new()?);
                 fit!(chip, stm32f427, wiring, converter, line, hse_hz);
+                // SPI3.
+                chip.spi[2].attach(CableEnd(encoder.clone()));
                 Chip::F4(chip)
             }
             Family::H7 => {

@@ -1,17 +1,16 @@
 //! x behind a BiSS-C encoder.
 
-use std::path::Path;
-
 use anyhow::{Context, Result};
 use quadrant_link::message::{AxisName, Body, MachineState};
 use quadrant_settings::{SerialSettings, StageSettings, TravelSettings};
 
-use crate::bench::Bench;
+use crate::bench::{Bench, Subject};
 use crate::biss::{self, Flaw};
 use crate::link::Client;
 use crate::report::Report;
 use crate::scenarios::{enable, row_fault, row_off, started};
 use crate::stage::COUNT_MM;
+use crate::wiring::Family;
 
 /// Position that the encoder shows where the axis is at zero, mm.
 const OFFSET_MM: f64 = 1234.5;
@@ -48,7 +47,7 @@ fn count(position_mm: f64) -> i64 {
 }
 
 /// Contents of the settings' sectors with these settings.
-fn stored(image: &Path) -> Result<Vec<u8>> {
+fn stored(image: &Subject) -> Result<Vec<u8>> {
     let mut bench = started(image, None)?;
     let mut client = Client::open(&mut bench)?;
     client.load(&mut bench, &settings(), &StageSettings::default())?;
@@ -57,7 +56,7 @@ fn stored(image: &Path) -> Result<Vec<u8>> {
 }
 
 /// The board with the encoder at the start, driving.
-fn driving(image: &Path, flash: &[u8]) -> Result<(Bench, Client)> {
+fn driving(image: &Subject, flash: &[u8]) -> Result<(Bench, Client)> {
     let mut bench = started(image, Some(flash))?;
     bench.with(|world, _, _| (world.plant, world.serial_start) = (true, Some(count(START_MM))));
     bench.run_for(0.05);
@@ -66,7 +65,7 @@ fn driving(image: &Path, flash: &[u8]) -> Result<(Bench, Client)> {
     Ok((bench, client))
 }
 
-fn jogging(image: &Path, flash: &[u8]) -> Result<(Bench, Client)> {
+fn jogging(image: &Subject, flash: &[u8]) -> Result<(Bench, Client)> {
     let (mut bench, mut client) = driving(image, flash)?;
     let jog = Body::Jog {
         axis: AxisName::X,
@@ -77,7 +76,19 @@ fn jogging(image: &Path, flash: &[u8]) -> Result<(Bench, Client)> {
     Ok((bench, client))
 }
 
-pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
+pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
+    if image.board.family != Family::F4 {
+        let refusal = stored(image).err().map(|error| format!("{error:#}"));
+        let answer = refusal.unwrap_or_else(|| "accepted".into());
+        let refused = answer.contains("x/encoder/serial: this board reads no serial encoder");
+        report.row(
+            "a board without an input for it",
+            "refused by name",
+            answer,
+            refused,
+        );
+        return Ok(());
+    }
     let flash = stored(image)?;
     let (mut bench, mut client) = driving(image, &flash)?;
     let status = client.status(&mut bench)?;
@@ -95,6 +106,8 @@ pub(super) fn run(image: &Path, report: &mut Report) -> Result<()> {
     };
     client.ask(&mut bench, jog)?;
     bench.run_for(0.2);
+    // A jog ends when its host is silent.
+    client.status(&mut bench)?;
     bench.with(|world, _, _| world.ages = (u64::MAX, 0));
     bench.ticks();
     let from = bench.with(|world, _, now| (world.serial_count(), now.0));
