@@ -17,6 +17,7 @@ use rigless::symbols::Symbols;
 use rigless::time::VirtualNanos;
 
 use crate::ad5754r::{self, Shared};
+use crate::biss::{self, SharedEncoder};
 use crate::board::{COUNTER, HSE_HZ, Nucleo, SharedLine};
 use crate::log::Log;
 use crate::stage::{Axis, INDEX_COUNTS, STEP_NS};
@@ -138,6 +139,11 @@ pub struct World {
     /// Restarts: time in ns, cause.
     pub resets: Vec<(u64, ResetCause)>,
     chip: Shared,
+    encoder: SharedEncoder,
+    /// Count of the serial encoder where x began; none while there is no such encoder.
+    pub serial_start: Option<i64>,
+    /// Shortest and longest time from the serial encoder's position to the tick that reads it, ns.
+    pub ages: (u64, u64),
     counts: [u32; 3],
     /// Control ticks since the start, each complete.
     pub record: Vec<TickRecord>,
@@ -182,6 +188,11 @@ impl World {
         self.pulses.push((now.0 + ns, axis, line, level));
     }
 
+    /// Count of the serial encoder.
+    pub fn serial_count(&self) -> i64 {
+        biss::lock(&self.encoder).count
+    }
+
     fn note_count(&mut self, axis: usize, read: u32) {
         let last = &mut self.counts[axis];
         *last = match self.wiring.encoders[axis].mask {
@@ -206,6 +217,11 @@ impl World {
                 self.spun[axis] += self.spin[axis] * STEP_NS as f64 * 1e-9;
                 self.spun[axis].floor() as i64
             };
+            if axis == 0
+                && let Some(start) = self.serial_start
+            {
+                biss::lock(&self.encoder).count = start + target;
+            }
             let change = target - self.shown[axis];
             for k in 0..change.abs() {
                 let at = now + STEP_NS * k as u64 / change.unsigned_abs();
@@ -283,6 +299,8 @@ impl Driver<Nucleo> for World {
                     });
                 }
                 self.ticks.acknowledge(now.0, access.instruction_count);
+                let age = now.0 - biss::lock(&self.encoder).latched_ns;
+                self.ages = (self.ages.0.min(age), self.ages.1.max(age));
             }
             address if address == self.wiring.watchdog_key && access.value & 0xFFFF == 0xAAAA => {
                 if self.feeds.0 != 0 {
@@ -370,6 +388,8 @@ pub struct Bench {
     pub chip: Shared,
     /// The link's line.
     pub line: SharedLine,
+    /// The serial encoder.
+    pub encoder: SharedEncoder,
     now: u64,
 }
 
@@ -383,9 +403,10 @@ impl Bench {
     pub fn start_with_clock(image: &Subject, settings: Option<&[u8]>, hse_hz: u64) -> Self {
         let (orders, received) = sync_channel(0);
         let (chip, line) = (Shared::default(), SharedLine::default());
+        let encoder = SharedEncoder::default();
         let wiring = image.board;
         let (image, settings) = (image.clone(), settings.map(<[u8]>::to_vec));
-        let around = (chip.clone(), line.clone());
+        let around = (chip.clone(), line.clone(), encoder.clone());
         let run = move || run(&image, settings, hse_hz, &around, received);
         let model = std::thread::Builder::new()
             .name("chip".into())
@@ -397,6 +418,7 @@ impl Bench {
             model: Some(model.expect("a thread")),
             chip,
             line,
+            encoder,
             now: 0,
         }
     }
@@ -568,6 +590,13 @@ impl Bench {
                 .iter()
                 .map(|(at, what)| format!("AD5754R at {} us: {what}", at / 1000)),
         );
+        let encoder = biss::lock(&self.encoder);
+        all.extend(
+            encoder
+                .complaints
+                .iter()
+                .map(|(at, what)| format!("encoder at {} us: {what}", at / 1000)),
+        );
         all
     }
 }
@@ -577,7 +606,7 @@ fn run(
     image: &Subject,
     settings: Option<Vec<u8>>,
     hse_hz: u64,
-    (chip, line): &(Shared, SharedLine),
+    (chip, line, encoder): &(Shared, SharedLine, SharedEncoder),
     orders: Receiver<Order>,
 ) -> Result<(), String> {
     let text = |error: &dyn std::fmt::Display| error.to_string();
@@ -594,7 +623,7 @@ fn run(
             .map_err(|e| text(&e))?,
         );
     }
-    let board = Nucleo::new(image, chip, line, hse_hz).map_err(|e| text(&e))?;
+    let board = Nucleo::new(image, chip, line, encoder, hse_hz).map_err(|e| text(&e))?;
     let session = Session::new(Box::new(board), 0, VirtualNanos(0)).map_err(|e| text(&e))?;
     let world = World {
         wiring: image.board,
@@ -616,6 +645,9 @@ fn run(
         feeds: (0, 0),
         resets: Vec::new(),
         chip: chip.clone(),
+        encoder: encoder.clone(),
+        serial_start: None,
+        ages: (u64::MAX, 0),
         counts: [0; 3],
         record: Vec::new(),
         trace: None,

@@ -17,6 +17,7 @@ use rigless::time::VirtualNanos;
 
 use crate::ad5754r::{End, Shared, Wire};
 use crate::bench::Subject;
+use crate::biss::{CableEnd, SharedEncoder};
 use crate::wiring::{At, Family, TimerModel, Wiring};
 
 /// Rate that the debug probe feeds to OSC_IN, Hz.
@@ -125,11 +126,12 @@ macro_rules! fit {
 }
 
 impl Nucleo {
-    /// A board with a converter, a link's line and a rate at OSC_IN, Hz.
+    /// A board with a converter, a link's line, a serial encoder where it has an input for it, and a rate at OSC_IN, Hz.
     pub fn new(
         subject: &Subject,
         converter: &Shared,
         line: &SharedLine,
+        encoder: &SharedEncoder,
         hse_hz: u64,
     ) -> Result<Self, Error> {
         let wiring = subject.board;
@@ -137,6 +139,8 @@ impl Nucleo {
             Family::F4 => {
                 let mut chip = Box::new(Stm32f427::new()?);
                 fit!(chip, stm32f427, wiring, converter, line, hse_hz);
+                // SPI3.
+                chip.spi[2].attach(CableEnd(encoder.clone()));
                 Chip::F4(chip)
             }
             Family::H7 => {

@@ -2,6 +2,7 @@
 
 mod ad5754r;
 mod bench;
+mod biss;
 mod board;
 mod link;
 mod log;

@@ -10,6 +10,7 @@ mod inputs;
 mod jog;
 mod link_log;
 mod model;
+mod serial_encoder;
 mod start;
 mod store;
 mod words;
@@ -55,6 +56,7 @@ pub const SCENARIOS: &[Scenario] = scenarios! {
     "nmi", "the interrupt of the clock security system", faults::nmi;
     "inputs", "each safety input of a moving machine", inputs::run;
     "converter", "converter lost in mid-frame", converter::run;
+    "serial-encoder", "x behind a BiSS-C encoder: position, age, damaged frames, cut wire, error bit", serial_encoder::run;
     "flood", "noise and requests without a pause on the link", flood::run;
     "link-log", "the log over the link, while no probe reads it", link_log::run;
     "clock", "8 MHz missing at the start, and lost in motion", clock::run;

@@ -155,7 +155,7 @@ impl Refusal {
                     "the encoder's reading is stale; check the encoder's interface"
                 }
                 FaultCode::EncoderInvalid => {
-                    "both lines of the encoder change at once; check its cable and supply"
+                    "the encoder's readings are not valid; check its cable, supply and settings, and the encoder"
                 }
                 _ => "an input is bad; `inputs` shows which",
             },

@@ -68,6 +68,17 @@ impl Default for SerialSettings {
     }
 }
 
+impl SerialSettings {
+    /// Bytes that are clocked for a frame with a position of `counter_bits`. For BiSS-C eight, since encoder and cable decide where the
+    /// position starts; for SSI those that hold the word and a bit on either side, since its clock is slow.
+    pub const fn frame_bytes(&self, counter_bits: u8) -> usize {
+        match self.protocol {
+            SerialProtocol::BissC => 8,
+            SerialProtocol::Ssi => (counter_bits as usize + 3).div_ceil(8),
+        }
+    }
+}
+
 impl AxisSettings {
     /// The middle of the travel, mm; zero without one. From it, positions of an absolute encoder are half of its range away at most.
     fn middle_mm(&self) -> f64 {

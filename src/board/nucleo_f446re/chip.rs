@@ -8,6 +8,7 @@ use stm32f4xx_hal::pac::Interrupt;
 
 #[cfg(not(feature = "output-on-chip"))]
 pub(crate) use super::bus_times::{READING, WRITING};
+pub(crate) use super::serial_input::{FrameReport, SerialInput};
 #[cfg(not(feature = "output-on-chip"))]
 pub(crate) use super::spi::{Rate, Spi};
 pub(crate) use super::supply::Supply;

@@ -4,6 +4,7 @@ use stm32f4xx_hal::gpio::{PA6, PA7, PB0, PB8, PB9, PB10, PC6, PC7, PC8, Pull};
 use stm32f4xx_hal::pac::{TIM2, TIM3, TIM8};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
+use super::serial_input::SerialInput;
 use crate::board::stm32::encoders::{
     Counter, Encoders, Extended, captured, narrow_counter, start_counting,
 };
@@ -47,7 +48,12 @@ pub(super) fn keep_up() {
 }
 
 /// Starts counting from zero.
-pub(super) fn start(timers: (TIM2, TIM3, TIM8), pins: Pins, rcc: &mut Rcc) -> Encoders {
+pub(super) fn start(
+    timers: (TIM2, TIM3, TIM8),
+    pins: Pins,
+    serial: SerialInput,
+    rcc: &mut Rcc,
+) -> Encoders {
     let (x, y, z) = timers;
     // A line that is not driven rests high.
     let Pins {
@@ -75,5 +81,5 @@ pub(super) fn start(timers: (TIM2, TIM3, TIM8), pins: Pins, rcc: &mut Rcc) -> En
     start_counting!(x, u32::MAX, 0);
     start_counting!(y, u16::MAX, 0);
     start_counting!(z, u16::MAX, HALVE_FILTER_CLOCK);
-    Encoders::new(x, y, z)
+    Encoders::new(x, y, z, serial)
 }

@@ -7,6 +7,7 @@
 //! | encoder x: A, B, index          | PB8, PB9, PB10         | TIM2, 32 bit |
 //! | encoder y: A, B, index          | PA6, PA7, PB0          | TIM3, 16 bit, extended |
 //! | encoder z: A, B, index          | PC6, PC7, PC8          | TIM8, 16 bit, extended |
+//! | serial encoder x: MA, SLO       | PB3, PB4               | SPI3, TIM6, DMA1; instead of A, B, index |
 //! | DAC: SCLK, SDIN, SDO            | PB13, PB15, PB14       | SPI2, DMA1 |
 //! | DAC: /SYNC, /LDAC, /CLR         | PB12, PB1, PB2         | TIM1 and DMA2, /CLR by hand |
 //! | amplifier enable                | PC9, high enables      | |
@@ -22,7 +23,7 @@
 //! | on-chip converters (fallback)   | PA4, PA5               | DAC |
 //! | control tick                    |                        | TIM7 |
 //!
-//! Left alone: SWD and SWO (PA13, PA14, PB3), PA15 and PB4, which are JTAG's at power-up, the oscillators' (PC14, PC15,
+//! Left alone: SWD (PA13, PA14), without a serial encoder SWO (PB3) and PB4, PA15, which are JTAG's at power-up, the oscillators' (PC14, PC15,
 //! PH0, PH1), and the spare PD2.
 
 #[cfg(not(feature = "output-on-chip"))]
@@ -32,6 +33,8 @@ mod encoders;
 mod flash;
 #[cfg(feature = "output-on-chip")]
 mod on_chip;
+mod serial_input;
+mod serial_times;
 #[cfg(not(feature = "output-on-chip"))]
 mod spi;
 mod supply;
@@ -49,6 +52,7 @@ use self::chip::{CORE_HZ, Supply, Usart};
 pub(crate) use self::flash::SettingsFlash;
 #[cfg(feature = "output-on-chip")]
 pub(crate) use self::on_chip::{Amplifiers, outputs_off};
+use self::serial_input::SerialInput;
 use self::wiring::INPUTS;
 use super::stm32::pulses::StepInput;
 use super::stm32::switches::pull_ups;
@@ -141,7 +145,9 @@ impl Board {
             z: (port_c.pc6, port_c.pc7, port_c.pc8),
         };
         let timers = (chip.TIM2, chip.TIM3, chip.TIM8);
-        let encoders = encoders::start(timers, encoder_pins, &mut rcc);
+        let serial_pins = (port_b.pb3, port_b.pb4);
+        let serial_input = SerialInput::new(chip.SPI3, chip.TIM6, serial_pins, &mut rcc);
+        let encoders = encoders::start(timers, encoder_pins, serial_input, &mut rcc);
         // A line that is not driven rests high.
         let _ = (
             port_b.pb6.into_alternate::<2>().internal_resistor(Pull::Up),
@@ -170,7 +176,7 @@ impl Board {
             operator: Operator::new(port_c.pc13.into_input()),
             amplifiers,
             tick: Tick::new(chip.TIM7, rates, core.DCB, core.DWT),
-            idle: Idle,
+            idle: Idle::new(),
             switches,
             serial,
             watchdog,

@@ -3,6 +3,7 @@
 use stm32h7::stm32h743v::Interrupt;
 
 pub(crate) use super::bus_times::{READING, WRITING};
+pub(crate) use super::encoders::{FrameReport, SerialInput};
 use super::gpio::{self, Pin};
 pub(crate) use super::spi::{Rate, Spi};
 pub(crate) use super::supply::Supply;

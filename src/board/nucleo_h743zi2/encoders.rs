@@ -1,5 +1,7 @@
 //! The timers of the encoders, of 16 bits each, extended. An erase of the flash does not hold up the control tick here.
 
+use quadrant_law::encoder::EncoderReading;
+use quadrant_settings::EncoderSettings;
 use stm32h7::stm32h743v::{TIM1, TIM3, TIM4};
 
 use super::chip::FILTER_CLOCK;
@@ -13,6 +15,36 @@ static Z_COUNT: Extended = Extended::new();
 narrow_counter!(TIM1, X_COUNT);
 narrow_counter!(TIM3, Y_COUNT);
 narrow_counter!(TIM4, Z_COUNT);
+
+/// The input of a serial encoder: there is none.
+pub(crate) struct SerialInput;
+
+impl SerialInput {
+    /// The board has no such input.
+    pub(crate) const IS_THERE: bool = false;
+
+    /// Prepares for the encoder of x.
+    pub(crate) fn prepare(&mut self, _encoder: &EncoderSettings, _rate_hz: u32) {}
+
+    /// The reading of this tick; none without a serial encoder.
+    #[inline(always)]
+    pub(crate) fn read(&mut self) -> Option<EncoderReading> {
+        None
+    }
+}
+
+/// The report of a serial encoder's frames: there are none.
+pub(crate) struct FrameReport;
+
+impl FrameReport {
+    /// Nothing to report.
+    pub(crate) const fn new() -> Self {
+        Self
+    }
+
+    /// A turn of the idle loop.
+    pub(crate) fn turn(&mut self) {}
+}
 
 /// Starts counting from zero. The timers are clocked and reset.
 pub(super) fn start(x: TIM1, y: TIM3, z: TIM4) -> Encoders {
@@ -29,5 +61,5 @@ pub(super) fn start(x: TIM1, y: TIM3, z: TIM4) -> Encoders {
     start_counting!(x, u16::MAX, FILTER_CLOCK);
     start_counting!(y, u16::MAX, FILTER_CLOCK);
     start_counting!(z, u16::MAX, FILTER_CLOCK);
-    Encoders::new(x, y, z)
+    Encoders::new(x, y, z, SerialInput)
 }

@@ -126,7 +126,7 @@ impl Board {
             operator: Operator::new(chip::Button::input(Pull::Down)),
             amplifiers,
             tick: Tick::new(chip.TIM7, (TICK_HZ, CORE_HZ), core.DCB, core.DWT),
-            idle: Idle,
+            idle: Idle::new(),
             switches: Switches::new(supply),
             serial,
             watchdog,

@@ -13,8 +13,9 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use quadrant::drivers::counter::ExtendedCounter;
 use quadrant::hal;
 use quadrant_law::encoder::EncoderReading;
+use quadrant_settings::EncoderSettings;
 
-use crate::board::chip::{ENCODER_FILTER, X, Y, Z};
+use crate::board::chip::{ENCODER_FILTER, SerialInput, X, Y, Z};
 
 /// TIMx_CCMR1: channels 1 and 2 are inputs from their own pins (CC1S = CC2S = 01), filtered (IC1F, IC2F).
 pub(crate) const CAPTURE_A_B: u32 = (0b01 | (ENCODER_FILTER.icf as u32) << 4) * 0x0101;
@@ -120,16 +121,23 @@ pub(crate) struct Encoders {
     x: X,
     y: Y,
     z: Z,
+    serial: SerialInput,
 }
 
 impl Encoders {
-    /// The timers, which count.
-    pub(crate) const fn new(x: X, y: Y, z: Z) -> Self {
-        Self { x, y, z }
+    /// The timers, which count, and the input of a serial encoder of x.
+    pub(crate) const fn new(x: X, y: Y, z: Z, serial: SerialInput) -> Self {
+        Self { x, y, z, serial }
     }
 }
 
 impl hal::Encoders for Encoders {
+    const SERIAL_AXES: [bool; 3] = [SerialInput::IS_THERE, false, false];
+
+    fn prepare(&mut self, [x, ..]: &[EncoderSettings; 3], rate_hz: u32) {
+        self.serial.prepare(x, rate_hz);
+    }
+
     /// All three wrap at 32 bits. The counts are read before the captures: a captured count is near the one read.
     #[inline(always)]
     fn read(&mut self) -> [EncoderReading; 3] {
@@ -138,8 +146,12 @@ impl hal::Encoders for Encoders {
             index,
             ..EncoderReading::of(count)
         };
+        let of_x = match self.serial.read() {
+            Some(of_x) => of_x,
+            None => reading(x, self.x.captured()),
+        };
         [
-            reading(x, self.x.captured()),
+            of_x,
             reading(y, self.y.captured()),
             reading(z, self.z.captured()),
         ]

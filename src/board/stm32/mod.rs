@@ -7,12 +7,13 @@
 //! | `CONTROL_TICK`, `DISPATCHERS` | `device` |
 //! | `Enable`, `Brake`, `Clear`, `Sync`, `Load`, `lines_off` | `amplifiers`, `converter_bus` |
 //! | `Spi`, `Rate`, `ConverterTimer`, `TIMER_STREAM`, `SPI_STREAM`, `port_address`, `set_lines`, `SYNC`, `LOAD`, `PATIENCE`, `WRITING`, `READING` | `converter_bus` |
-//! | `X`, `Y`, `Z` | `encoders` |
+//! | `X`, `Y`, `Z`, `SerialInput` | `encoders` |
 //! | `Usart`, `UART_STREAM` | `serial` |
 //! | `StepTimer`, `ServoOn`, `Alarm`, `is_backwards`, `ENCODER_FILTER`, `FILTER_CLOCK` | `pulses` |
 //! | `Supply`, `levels`, `INPUTS` | `switches` |
 //! | `freeze_in_debug` | `watchdog` |
 //! | `Button`, `is_pressed` | [`Operator`] |
+//! | `FrameReport` | [`Idle`] |
 
 #[cfg(not(feature = "output-on-chip"))]
 pub(super) mod amplifiers;
@@ -115,14 +116,23 @@ impl Operator {
 }
 
 /// The work of the idle loop.
-pub(crate) struct Idle;
+pub(crate) struct Idle {
+    frames: chip::FrameReport,
+}
 
 impl Idle {
-    /// One turn of the idle loop: nothing. It never finishes.
+    /// An idle loop that has not turned.
+    pub(super) const fn new() -> Self {
+        Self {
+            frames: chip::FrameReport::new(),
+        }
+    }
+
+    /// One turn of the idle loop: it reports a serial encoder's frames. It never finishes.
     ///
     /// It does not sleep: a sleeping core is cut off from the debug probe that reads the log.
     pub(crate) fn turn(&mut self) -> Option<Finished> {
-        cortex_m::asm::nop();
+        self.frames.turn();
         None
     }
 }

@@ -1,6 +1,6 @@
 //! Absolute encoders with a serial interface, BiSS-C and SSI: from the bits that an SPI master shifted in to a reading.
 //!
-//! The master clocks some bytes a tick ([`frame_bytes`]) and rests until the next one. [`SerialEncoder::take`] decodes them ([`biss`],
+//! The master clocks some bytes a tick ([`SerialSettings::frame_bytes`]) and rests until the next one. [`SerialEncoder::take`] decodes them ([`biss`],
 //! [`ssi`]) and judges the frame:
 //!
 //! | frame | reading |
@@ -27,17 +27,8 @@ use quadrant_settings::{CheckBit, SerialProtocol, SerialSettings};
 /// Whole frames that must come before a damaged one is bridged: 0.1 s at 10 kHz.
 pub const BRIDGE_AFTER: u32 = 1000;
 
-/// The most bytes of a frame.
+/// The most bytes of a frame: [`SerialSettings::frame_bytes`].
 pub const MAX_FRAME_BYTES: usize = 8;
-
-/// Bytes of an encoder's frame with a position of `bits`. For BiSS-C as many as there are, since encoder and cable decide where it
-/// starts; for SSI those that hold the word and a bit on either side, since its clock is slow.
-pub const fn frame_bytes(protocol: SerialProtocol, bits: u32) -> usize {
-    match protocol {
-        SerialProtocol::BissC => MAX_FRAME_BYTES,
-        SerialProtocol::Ssi => (bits as usize + 3).div_ceil(8),
-    }
-}
 
 /// Content of a whole frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,7 +61,7 @@ pub struct FrameCounts {
     pub line: u32,
     /// Frames with [`Flaw::CheckSum`].
     pub check_sum: u32,
-    /// Frames with [`Flaw::Moved`].
+    /// Frames with [`Flaw::Moved`], from the first whole one on.
     pub moved: u32,
     /// Frames with the encoder's error bit.
     pub errors: u32,
@@ -172,12 +163,14 @@ impl SerialEncoder {
                 self.reading(true, true)
             }
             Err(flaw) => {
-                count(match flaw {
-                    Flaw::Line => &mut self.counts.line,
-                    Flaw::CheckSum => &mut self.counts.check_sum,
-                    Flaw::Moved => &mut self.counts.moved,
-                    Flaw::Error => &mut self.counts.errors,
-                });
+                match flaw {
+                    Flaw::Line => count(&mut self.counts.line),
+                    Flaw::CheckSum => count(&mut self.counts.check_sum),
+                    // Before the first whole frame, the start is being learnt.
+                    Flaw::Moved if self.age == u32::MAX => {}
+                    Flaw::Moved => count(&mut self.counts.moved),
+                    Flaw::Error => count(&mut self.counts.errors),
+                }
                 let bridged = self.whole >= BRIDGE_AFTER && flaw != Flaw::Error;
                 self.whole = 0;
                 if bridged {

@@ -46,7 +46,7 @@ pub enum FaultCode {
     PredictedSoftLimit = 8,
     /// The axis moves faster than it may.
     Overspeed = 9,
-    /// Both lines of the encoder changed at once.
+    /// A reading of the encoder is not valid: both lines changed at once, or a serial encoder's frame is not to be used.
     EncoderInvalid = 10,
     /// The encoder shows no motion though the output is high.
     #[cfg_attr(feature = "names", strum(serialize = "encoder-silent"))]
@@ -199,8 +199,9 @@ impl FaultCode {
                 "check the signs of encoder and amplifier, the gains, and what drives the axis from outside",
             ],
             Self::EncoderInvalid => [
-                "both lines of the encoder changed at once: counts are lost",
-                "check the encoder's cable, shield and supply, and its largest edge rate; then home again",
+                "the encoder's reading is not valid: both its lines changed at once, or the frames of a serial encoder are damaged \
+                 or carry its error bit",
+                "check the encoder's cable, shield and supply, its largest edge rate or its clock, and the encoder; then home again",
             ],
             Self::EncoderSignalLoss => [
                 "the encoder showed no motion though the output was high for silent_s",

@@ -166,7 +166,7 @@ fn enabling_with_a_bad_input_is_refused_and_names_it() {
         (
             FaultCode::EncoderInvalid,
             Some(AxisName::Z),
-            "z: both lines of the encoder change",
+            "z: the encoder's readings are not valid",
         ),
     ] {
         let interlock = EnableInterlock { code, axis };
