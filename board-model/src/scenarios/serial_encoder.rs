@@ -204,6 +204,19 @@ pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
             off_um,
             "um",
         );
+        if flaw == Flaw::Error {
+            // Once a second at most.
+            bench.run_for(1.1);
+            let log = bench.log();
+            let counts = log.iter().find(|line| line.contains("frames of the"));
+            let counts = counts.cloned().unwrap_or_default();
+            report.row(
+                "frames in the log",
+                "20 with its error",
+                &counts,
+                counts.contains(" 20 with its error"),
+            );
+        }
     }
     Ok(())
 }
