@@ -20,7 +20,7 @@ const REST_BITS: u32 = 2;
 /// Rising edges that see it low: the acknowledge, as long as the encoder computes.
 const ACKNOWLEDGE_BITS: u32 = 6;
 
-/// What is wrong with encoder or cable.
+/// Flaw of encoder or cable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Flaw {
     /// Nothing.
@@ -43,7 +43,7 @@ pub enum Flaw {
 pub struct Encoder {
     /// Position, of which the lowest bits are sent.
     pub count: i64,
-    /// What is wrong.
+    /// Flaw.
     pub flaw: Flaw,
     frame: u64,
     /// End of the last byte, ns.
