@@ -52,6 +52,8 @@ pub struct Encoder {
     pub latched_ns: u64,
     /// Frames so far.
     pub frames: u64,
+    /// Those of them with the encoder's error.
+    pub errors: u64,
     /// Complaints: time in ns, text; the first 20.
     pub complaints: Vec<(u64, String)>,
 }
@@ -82,6 +84,7 @@ impl Encoder {
             self.complain(now, "MA begins within the time-out");
         }
         self.frames += 1;
+        self.errors += u64::from(self.flaw == Flaw::Error);
         self.latched_ns = now;
         let status =
             u64::from(self.flaw != Flaw::Error) << 1 | u64::from(self.flaw != Flaw::Warning);
