@@ -20,7 +20,7 @@ const REST_BITS: u32 = 2;
 /// Rising edges that see it low: the acknowledge, as long as the encoder computes.
 const ACKNOWLEDGE_BITS: u32 = 6;
 
-/// What is wrong with encoder or cable.
+/// Flaw of encoder or cable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Flaw {
     /// Nothing.
@@ -43,7 +43,7 @@ pub enum Flaw {
 pub struct Encoder {
     /// Position, of which the lowest bits are sent.
     pub count: i64,
-    /// What is wrong.
+    /// Flaw.
     pub flaw: Flaw,
     frame: u64,
     /// End of the last byte, ns.
@@ -52,6 +52,8 @@ pub struct Encoder {
     pub latched_ns: u64,
     /// Frames so far.
     pub frames: u64,
+    /// Those of them with the encoder's error.
+    pub errors: u64,
     /// Complaints: time in ns, text; the first 20.
     pub complaints: Vec<(u64, String)>,
 }
@@ -82,6 +84,7 @@ impl Encoder {
             self.complain(now, "MA begins within the time-out");
         }
         self.frames += 1;
+        self.errors += u64::from(self.flaw == Flaw::Error);
         self.latched_ns = now;
         let status =
             u64::from(self.flaw != Flaw::Error) << 1 | u64::from(self.flaw != Flaw::Warning);

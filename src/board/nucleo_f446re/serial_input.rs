@@ -48,7 +48,7 @@ const CLEAR_SENDER: u32 = 0b11_1101 << 22;
 
 /// The value for SPI3_CR2.
 static KICKED: DmaMemory<u16, 1> = DmaMemory::new([BOTH_BY_DMA]);
-/// What is sent: nothing is connected there.
+/// The byte that is sent: nothing is connected there.
 static SENT: DmaMemory<u8, 1> = DmaMemory::new([0]);
 /// The frame; bytes behind it stay zero.
 static FRAME: DmaMemory<u8, MAX_FRAME_BYTES> = DmaMemory::new([0; MAX_FRAME_BYTES]);
@@ -59,7 +59,7 @@ static COUNTS: [AtomicU32; 7] = [const { AtomicU32::new(0) }; 7];
 /// The pins as they are after reset: clock (MA) and data (SLO).
 type Pins = (PB3<Debugger>, PB4<Debugger>);
 
-/// What the input is made of.
+/// The parts of the input.
 struct Parts {
     spi: SPI3,
     timer: TIM6,
