@@ -105,6 +105,8 @@ fn perturbed(path: &str, value: &Value) -> Value {
                 "stiffness_per_s2" => 1e6,
                 // Whole ticks count.
                 "preview_s" | "debounce_s" => number * 0.9,
+                // The first stroke is long, whatever its length; the second is short.
+                "from_mm" => 50.0,
                 _ if number == 0.0 => 1e-3,
                 _ => number * 0.97,
             })
