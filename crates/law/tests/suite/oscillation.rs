@@ -401,6 +401,13 @@ impl Shown {
         }
     }
 
+    /// Two seconds at rest.
+    fn rest(&mut self) {
+        for _ in 0..2 * 2500 {
+            self.monitor.step(&mut self.state, AT_REST);
+        }
+    }
+
     /// Share of what is added that acts.
     fn acts(&self) -> f64 {
         self.monitor.share(&self.state).to_f64(Quantity::Multiplier)
@@ -443,6 +450,15 @@ fn strokes_of_another_kind_say_nothing_of_what_was_taken_away() {
     assert_eq!(shown.state.reading().number, 0);
 }
 
+/// An axis that stands without an error.
+const AT_REST: OscillationInput = OscillationInput {
+    error: 0,
+    reference: 0,
+    sense: 0,
+    speed: 0,
+    excited: false,
+};
+
 /// Displacement in a tick of a number of counts, 2^-16 counts.
 const fn counts(thousandths: u32) -> u32 {
     (thousandths << 16) / 1000
@@ -469,16 +485,7 @@ fn friction_is_fed_forward_by_the_fastest_of_two_strokes_and_stays_as_it_is_at_r
     shown.strokes(1, 80, 10);
     assert!((shown.acts() - 0.5).abs() < 0.02, "{}", shown.acts());
     let half = shown.acts();
-    let at_rest = OscillationInput {
-        error: 0,
-        reference: 0,
-        sense: 0,
-        speed: 0,
-        excited: false,
-    };
-    for _ in 0..2 * 2500 {
-        shown.monitor.step(&mut shown.state, at_rest);
-    }
+    shown.rest();
     assert_eq!(shown.acts(), half, "at rest");
     // After a second at rest, what went before does not count.
     shown.speed = counts(100);
@@ -490,7 +497,7 @@ fn friction_is_fed_forward_by_the_fastest_of_two_strokes_and_stays_as_it_is_at_r
     let input = OscillationInput {
         sense: 1,
         speed: counts(2000),
-        ..at_rest
+        ..AT_REST
     };
     for _ in 0..125 {
         shown.monitor.step(&mut shown.state, input);
@@ -528,16 +535,7 @@ fn friction_is_fed_forward_on_strokes_beyond_a_length_and_on_the_first_one_after
     shown.strokes(2, 150, 10);
     assert!((shown.acts() - 0.5).abs() < 0.03, "{}", shown.acts());
     shown.strokes(2, 80, 10);
-    let at_rest = OscillationInput {
-        error: 0,
-        reference: 0,
-        sense: 0,
-        speed: 0,
-        excited: false,
-    };
-    for _ in 0..2 * 2500 {
-        shown.monitor.step(&mut shown.state, at_rest);
-    }
+    shown.rest();
     // Nobody knows how long it will be.
     shown.strokes(1, 80, 10);
     assert_eq!(shown.acts(), 1.0, "from rest");
