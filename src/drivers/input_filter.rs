@@ -68,6 +68,10 @@ const fn nanoseconds(cycles: u32, clock_hz: u32) -> u32 {
     (cycles as u64 * 1_000_000_000).div_ceil(clock_hz as u64) as u32
 }
 
+/// The fastest an encoder may count, per second: an axis at 250 mm/s with 0.5 um per count, and twice that, as the
+/// control law believes an encoder up to twice the axis' largest velocity.
+pub const FASTEST_COUNTS_PER_S: u32 = 1_000_000;
+
 /// The shortest level of a line of a quadrature encoder, ns, at `counts_per_s` (above zero): two counts if the signal is
 /// perfect; taken as half of that, as mark, space and phase of a real one are off.
 pub const fn shortest_level_ns(counts_per_s: u32) -> u32 {

@@ -1,12 +1,8 @@
 //! Meaning of the bits in the board's words. No registers here: the tests of the library include this file and run it on the host.
 
-use quadrant::drivers::input_filter::{InputFilter, shortest_level_ns};
+use quadrant::drivers::input_filter::{FASTEST_COUNTS_PER_S, InputFilter, shortest_level_ns};
 use quadrant::drivers::reset_flags::ResetFlags;
 use quadrant::drivers::switch_inputs::SwitchInputs;
-
-/// The fastest an encoder may count, per second: an axis at 250 mm/s with 0.5 um per count, and twice that, as the
-/// control law believes an encoder up to twice the axis' largest velocity.
-const FASTEST_COUNTS_PER_S: u32 = 1_000_000;
 
 /// The filter of all encoder inputs: the timers run at 240 MHz, a quarter of which is the filter's clock (CKD = 10).
 pub(crate) const ENCODER_FILTER: InputFilter =
