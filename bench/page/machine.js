@@ -2,8 +2,9 @@
 // The WebAssembly module: the bench, and the page's end of the link; requests as JSON, samples and words as arrays.
 
 async function openModule() {
-  const bytes = Uint8Array.from(atob(WASM), (character) => character.charCodeAt(0));
-  const { instance } = await WebAssembly.instantiate(bytes, {});
+  const packed = Uint8Array.from(atob(WASM), (character) => character.charCodeAt(0));
+  const unpacked = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const { instance } = await WebAssembly.instantiate(await new Response(unpacked).arrayBuffer(), {});
   const { memory, room, length, ...functions } = instance.exports;
   const encoder = new TextEncoder();
   const decoder = new TextDecoder();
