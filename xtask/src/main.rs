@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod board_run;
+mod book;
 mod documented;
 mod figures;
 mod frames;
@@ -102,6 +103,8 @@ enum Verb {
     Release(Forwarded),
     /// Build the page of the bench, which a browser opens
     Web(WebArgs),
+    /// Build the documentation as a searchable book, below target/book
+    Book,
     /// Run the commands that README and docs show, in folders below target/documented
     Documented(documented::Options),
     /// Hold what the pages say of instructions, cycles and sizes against the committed figures
@@ -226,6 +229,7 @@ fn run(cli: Cli) -> Result<bool> {
             wheel: Some(folder),
         } => python::build_wheel(&folder)?,
         Verb::Release(args) => release(cli.toolchain, args)?,
+        Verb::Book => book::build()?,
         Verb::Documented(options) => documented::run(&options)?,
         Verb::Figures { overwrite } => figures::run(overwrite)?,
         Verb::Web(args) => {

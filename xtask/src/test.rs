@@ -13,7 +13,7 @@ use xtask::image::{self, LAW_TRIPLES, LIBRARY_TRIPLES, TRIPLES, Target};
 use xtask::toolchain::{self, Choice, Toolchain};
 use xtask::{command, prove};
 
-use crate::{documented, figures, layout, lines, msrv, python, setup, transcript, web};
+use crate::{book, documented, figures, layout, lines, msrv, python, setup, transcript, web};
 
 /// Settings that a commissioning left, and seconds that the firmware runs on them.
 const COMMISSIONED: &str = "host-sim/data/identified-stage.toml";
@@ -80,6 +80,7 @@ pub(crate) fn run(choice: Choice) -> Result<bool> {
     report.step("the figures in the pages", || figures::run(false));
     host(&mut report)?;
     firmware.finish(&mut report)?;
+    report.step("the book", book::build);
     report.step("the commands that the documentation shows", || {
         documented::run(&documented::Options::default())
     });
