@@ -98,6 +98,10 @@ fn continuous_v() -> f64 {
     AmplifierSettings::default().continuous_v
 }
 
+fn whole_range() -> f64 {
+    FeedforwardSettings::default().range
+}
+
 fn overload_s() -> f64 {
     AmplifierSettings::default().overload_s
 }
@@ -111,6 +115,9 @@ pub struct FeedforwardSettings {
     pub kind: FeedforwardKind,
     /// Shares of the models, and the inertia gain.
     pub gains: FeedforwardGains,
+    /// Displacement over which friction is fed forward before it slides, over that of `friction`: springs are softer by it.
+    #[serde(default = "whole_range")]
+    pub range: f64,
     /// Look-ahead of the feedforward over the feedback's reference, s: the plant's delay.
     pub preview_s: f64,
     /// Largest velocity of motions to and fro on which no friction is fed forward, mm/s; from twice that on, all of it is.

@@ -220,7 +220,7 @@ impl AxisSettings {
             .feedforward(
                 feedforward.kind,
                 &feedforward.gains,
-                &self.friction,
+                &self.friction.over_range(feedforward.range),
                 preview_ticks,
             )
             .bumpless(feedback.transfer_s)
@@ -456,5 +456,28 @@ impl PlanSettings {
             let index = axis as usize;
             Motion::build(&self.motions[index], stage.motion_scale(index))
         }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn friction_that_is_fed_forward_over_another_range_leaves_what_the_encoder_is_expected_to_show()
+    {
+        let axis = StageSettings::simulated().axes[0].clone();
+        let mut softer = axis.clone();
+        softer.feedforward.range = 2.5;
+        assert_eq!(
+            softer.build_plausibility(1e-4),
+            axis.build_plausibility(1e-4)
+        );
+        // Softer springs of the friction itself do not.
+        softer.friction = softer.friction.over_range(2.5);
+        assert_ne!(
+            softer.build_plausibility(1e-4),
+            axis.build_plausibility(1e-4)
+        );
     }
 }

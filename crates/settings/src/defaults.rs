@@ -232,6 +232,7 @@ impl Default for FeedforwardSettings {
                 presliding: default!("feedforward.gains.presliding"),
                 inertia_v_s2_per_mm: default!("feedforward.gains.inertia_v_s2_per_mm"),
             },
+            range: default!("feedforward.range"),
             preview_s: default!("feedforward.preview_s"),
             from_mm_s: default!("feedforward.from_mm_s"),
             from_mm: default!("feedforward.from_mm"),

@@ -94,10 +94,8 @@ fn axes_with_short_travels_are_commissioned_over_the_firmwares_path() {
         .collect();
     for line in &lines {
         println!("{line:?}");
-        // A law that is hardly better than the PID may be refused for it. The axis of 26 mm, with an encoder of 1.3 um and cogging, ends in
-        // a false alarm: it rests between two trials, and `encoder-implausible` switches it off.
-        let ends = [Outcome::Commissioned, Outcome::PidAlone].contains(&line.outcome)
-            || line.reason.contains("wait rest: fault 28");
+        // A law that is hardly better than the PID may be refused for it.
+        let ends = [Outcome::Commissioned, Outcome::PidAlone].contains(&line.outcome);
         assert!(ends, "{line:?}");
     }
     let commissioned = lines

@@ -44,6 +44,22 @@ impl FrictionSettings {
         }
     }
 
+    /// The same friction, over `factor` times the displacement before it slides.
+    #[must_use]
+    pub fn over_range(&self, factor: f64) -> Self {
+        let mut softer = self.clone();
+        for element in &mut softer.gms.elements {
+            element.stiffness_v_per_mm /= factor;
+        }
+        if let Some(lugre) = &mut softer.lugre {
+            lugre.stiffness_v_per_mm /= factor;
+        }
+        if let Some(dahl) = &mut softer.dahl {
+            dahl.stiffness_v_per_mm /= factor;
+        }
+        softer
+    }
+
     /// The mean of both directions' breakaway levels, V.
     pub fn mean_breakaway_v(&self) -> f64 {
         let PerDirection { positive, negative } = &self.sliding;

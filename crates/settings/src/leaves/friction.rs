@@ -68,6 +68,8 @@ pub(super) const LEAVES: &[LeafInfo] = &[
         "Share of the pre-sliding model's force, whichever model acts."),
     number("feedforward.gains.inertia_v_s2_per_mm", "V s²/mm", at(0.0), at(1.0), 0.0,
         "Inertia gain: 1 / A for the whole of it, 0 for none."),
+    number("feedforward.range", "", at(0.01), at(100.0), 1.0,
+        "Displacement over which friction is fed forward before it slides, over that of the friction settings: springs are softer by it."),
     number("feedforward.preview_s", "s",
         at(0.0), times(MAX_PREVIEW_TICKS as f64, "the control period", period_s), 0.0,
         "Look-ahead of the feedforward over the feedback's reference: the plant's delay."),

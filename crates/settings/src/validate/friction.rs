@@ -147,7 +147,7 @@ impl AxisSettings {
         let Some(plant) = &self.plant else {
             return Ok(());
         };
-        let most = plant.stiffest_v_per_mm(period_s);
+        let most = self.feedforward.range * plant.stiffest_v_per_mm(period_s);
         if stiffness_v_per_mm > most {
             return at.refuse(field, stiffness_v_per_mm, Reason::TooStiffForRate { most });
         }

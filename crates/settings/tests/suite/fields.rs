@@ -46,6 +46,7 @@ pub(crate) const FIELDS: &[(&str, f64, f64)] = &[
     ("feedforward.gains.viscous", -0.1, 2.1),
     ("feedforward.gains.presliding", -0.1, 2.1),
     ("feedforward.gains.inertia_v_s2_per_mm", -0.1, 1.1),
+    ("feedforward.range", 0.009, 100.1),
     ("feedforward.preview_s", -1e-4, 3.2e-3),
     ("feedforward.from_mm_s", -0.1, 1000.1),
     ("feedforward.from_mm", -0.1, 100.1),

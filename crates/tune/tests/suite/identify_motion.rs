@@ -533,13 +533,15 @@ fn a_record_that_hardly_accelerates_leaves_its_inertia_in_doubt_and_an_ordinary_
         recommended(&candidates).unwrap().model.clone()
     };
     let found = model(&record);
-    assert!(
-        found.doubts().iter().any(|doubt| doubt.name == "M'"
-            && doubt.share > 0.25
-            && doubt.remedy.contains("accelerate")),
-        "{:?}",
-        found.estimates
-    );
+    let doubts = found.doubts();
+    let doubt = doubts.iter().find(|doubt| doubt.name == "M'");
+    let doubt = doubt.expect("a slow sine has no inertia to be seen");
+    assert!(doubt.remedy.contains("accelerate"), "{doubt:?}");
+    // It is no surer than it is right.
+    let true_inertia = 1.0 / truth.gain_mm_per_v_s2;
+    let wrong = (1.0 - true_inertia / found.inertia_v_s2_per_mm).abs();
+    println!("{doubt:?}, and {wrong:.2} wrong");
+    assert!(doubt.share > wrong, "{doubt:?}, and {wrong:.2} wrong");
     let found = model(&simulated(0, truth));
     assert!(found.doubts().is_empty(), "{:?}", found.estimates);
 }

@@ -1,11 +1,16 @@
 //! Experiments on the simulated stage's axes.
 
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::reference::{MotionSettings, PointToPointSettings};
 use quadrant_law::units::DacCode;
 use quadrant_settings::presets::x_axis;
 use quadrant_sim::plant::StageParameters;
 use quadrant_tune::record::Recording;
-use quadrant_tune::test_axis::{Drive, Experiment, ExperimentError, SimulatedTestAxis, TestAxis};
+use quadrant_tune::test_axis::{
+    Drive, Experiment, ExperimentError, SimulatedTestAxis, TestAxis, approach, approach_mm_s,
+};
 
 fn test_axis(seed: u64) -> SimulatedTestAxis {
     SimulatedTestAxis::new(0, StageParameters::real().axes[0].clone(), seed)
@@ -156,4 +161,37 @@ fn the_same_seed_gives_the_same_recording() {
         |seed| perform(&mut test_axis(seed), &experiment(moving(1.0), Vec::new())).unwrap();
     assert_eq!(record(3), record(3));
     assert_ne!(record(3), record(4));
+}
+
+/// A PID that friction holds until its integral has grown: at the usual velocity it is left behind by more than the limit.
+#[test]
+fn an_axis_that_lags_too_far_behind_an_approach_is_moved_more_slowly() {
+    let mut test_axis = test_axis(1);
+    let mut settings = test_axis.settings().clone();
+    settings.feedforward.kind = FeedforwardKind::None;
+    settings.feedback.law = LawKind::Pid;
+    settings.feedback.pid = PidGains {
+        kp_v_per_mm: 0.02,
+        ki_v_per_mm_s: 0.1,
+        kd_v_s_per_mm: 1e-3,
+        ..settings.feedback.pid
+    };
+    settings.limits.following_error_mm = 2.0;
+    settings.limits.following_error_max_mm = 2.0;
+    test_axis.apply(&settings).unwrap();
+    let at_once = Drive::ClosedLoop(MotionSettings::PointToPoint(PointToPointSettings {
+        distance_mm: 10.0,
+        max_velocity_mm_s: approach_mm_s(&test_axis.info()),
+        max_acceleration_mm_s2: 300.0,
+        max_jerk_mm_s3: 5e3,
+    }));
+    let fault = perform(&mut test_axis, &experiment(at_once, Vec::new()));
+    assert!(
+        matches!(fault, Err(ExperimentError::Fault { .. })),
+        "{fault:?}"
+    );
+    approach(&mut test_axis, 10.0).unwrap();
+    let look = experiment(Drive::ClosedLoop(MotionSettings::Hold), vec![0.0; 100]);
+    let there = perform(&mut test_axis, &look).unwrap();
+    assert!((there.position_mm[0] - 10.0).abs() < 2.0, "{there:?}");
 }

@@ -1,8 +1,7 @@
 //! Small slow motions: the chosen law is not to be worse than the PID there either, if less of it is not.
 //!
 //! The level of friction that is fed forward at the slow speed of the reference is more than a table needs once it breaks away. What is
-//! left over, divided by the stiffness of a soft loop, throws the axis. The same level at every speed, below what sliding keeps, takes the
-//! throw away and loses least on other motions. Where it is not enough, or an axis that noise shakes meets hardly any friction when slow,
+//! left over, divided by the stiffness of a soft loop, throws the axis; and one that noise shakes meets hardly any friction when slow. There
 //! none is fed forward on slow motions. Where strokes are so short that the PID sticks, it leaves no more than a stroke, and what friction
 //! is fed forward has to be exact to gain anything: there none is, if that is the harm.
 
@@ -12,9 +11,9 @@ use quadrant_sim::sine_test::SineTest;
 
 use super::VerifyError;
 use super::law_result::{LawResult, MAX_ERROR_RATIO, MAX_SCATTER_RATIO};
-use super::sines::{CHOICE_SINES, MARGIN_SINES, SmallSine};
+use super::sines::{MARGIN_SINES, SmallSine};
 use super::trials::Trials;
-use super::variants::{feeding_beyond, feeding_from, flattened, with_friction};
+use super::variants::{feeding_beyond, feeding_from, with_friction};
 
 /// Largest excess of a largest error over the PID's that counts as none, counts: one, by which that of an axis that sticks scatters, and
 /// what rounding adds.
@@ -49,18 +48,14 @@ pub struct WorseSine {
 /// Change of a law that is worse than the PID on small slow motions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Remedy {
-    /// A level that no speed changes: this share of the lower one of the Coulomb and the breakaway level.
-    Flat(f64),
     /// No friction fed forward on motions up to a velocity, mm/s.
     From(f64),
     /// The same without the nonlinear gain: on such motions it is the PID.
     LinearFrom(f64),
 }
 
-/// Remedies in the order in which they are tried: the first that is not worse than the PID on any sine is chosen. On random axes a flat level
-/// of 0.9 lost least where the table was thrown.
-pub(super) const REMEDIES: [Remedy; 4] = [
-    Remedy::Flat(0.9),
+/// Remedies in the order in which they are tried: the first that is not worse than the PID on any sine is chosen.
+pub(super) const REMEDIES: [Remedy; 3] = [
     Remedy::From(0.4),
     Remedy::From(FROM_MM_S),
     Remedy::LinearFrom(FROM_MM_S),
@@ -81,10 +76,6 @@ impl Remedy {
     fn of(self, law: &LawResult, pid: &AxisSettings) -> Option<(String, AxisSettings)> {
         let name = &law.law;
         Some(match self {
-            Self::Flat(share) => (
-                format!("{name}, level x {share:.2} at any speed"),
-                flattened(&law.settings, share),
-            ),
             Self::From(from_mm_s) => (
                 format!("{name}, from {from_mm_s} mm/s"),
                 feeding_from(&law.settings, from_mm_s),
@@ -176,11 +167,6 @@ impl Trials<'_, '_> {
         let refused = self.refuses_when_small(&mut found);
         if found.stopped.is_some() || refused && !same {
             return Ok(0);
-        }
-        if from_mm_s == 0.0 {
-            found.is_share = true;
-            self.bench.run_on(&mut found, CHOICE_SINES);
-            return self.add_and_judge(found);
         }
         // The whole of it was judged on these sines before, and part of it need not keep clear of the PID by as much.
         let all = self.bench.sines.len();
@@ -292,9 +278,8 @@ mod tests {
         };
         for remedy in REMEDIES {
             let (name, settings) = remedy.of(&law, &pid).unwrap();
-            let curve = |settings: &AxisSettings| settings.friction.sliding.positive.curve;
-            let lower = curve(&settings).level_v(0.2) < 0.91 * curve(&law.settings).level_v(0.2);
-            assert!(lower || settings.feedforward.from_mm_s >= 0.4, "{name}");
+            assert!(settings.feedforward.from_mm_s >= 0.4, "{name}");
+            assert_eq!(settings.friction, law.settings.friction);
             assert_eq!(settings.feedforward.gains, law.settings.feedforward.gains);
         }
         let linear = LawResult {

@@ -127,7 +127,7 @@ pub struct Estimate {
 pub struct Doubt {
     /// Name of the parameter.
     pub name: String,
-    /// Its standard error over its value.
+    /// Its standard error over its value; of an inertia that takes less voltage than the model leaves over, that ratio if it is larger.
     pub share: f64,
     /// Motion that would determine it.
     pub remedy: &'static str,
@@ -163,6 +163,8 @@ pub struct MotionModel {
     pub estimates: Vec<Estimate>,
     /// Norm of the residual over that of the voltage, over the rows of the fit.
     pub relative_error: f64,
+    /// RMS of the residual over that of the voltage that inertia takes: above one, what the model lacks may pass for inertia.
+    pub residual_over_inertia: f64,
 }
 
 /// A linear change of friction's level and of the offset, V.
@@ -236,9 +238,14 @@ impl MotionModel {
     /// The inertia and the damping, if the record hardly determines them: the plant is made of both.
     pub fn doubts(&self) -> Vec<Doubt> {
         let doubt = |estimate: &Estimate| {
-            let share = estimate.standard_error / estimate.value.abs();
+            let mut share = estimate.standard_error / estimate.value.abs();
             let remedy = match estimate.name.as_str() {
-                "M'" => "moves that accelerate more, back and forth",
+                "M'" => {
+                    if self.residual_over_inertia > 1.0 {
+                        share = share.max(self.residual_over_inertia);
+                    }
+                    "moves that accelerate more, back and forth"
+                }
                 name if name.starts_with("sigma") => {
                     "moves at several speeds both ways, the fastest included"
                 }

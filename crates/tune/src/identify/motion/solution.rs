@@ -150,6 +150,10 @@ impl Solution {
             _ => None,
         });
         let voltage = regression.voltage_at(self.dead_time_s);
+        let rms = |norm: f64, count: usize| norm / (count as f64).sqrt();
+        let accelerations = regression.columns_at(self.stribeck_velocity_mm_s);
+        let accelerations = accelerations.column(0);
+        let inertia_v = inertia * rms(accelerations.norm(), accelerations.len());
         Ok(MotionModel {
             structure,
             inertia_v_s2_per_mm: inertia,
@@ -166,6 +170,7 @@ impl Solution {
             elements: elements.collect(),
             estimates,
             relative_error: residual.norm() / voltage.norm(),
+            residual_over_inertia: rms(residual.norm(), residual.len()) / inertia_v,
         })
     }
 }
