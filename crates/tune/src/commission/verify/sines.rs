@@ -65,7 +65,7 @@ const fn small(amplitude_mm: f64, velocity_mm_s: f64, scored_cycles: usize) -> S
 /// Small slow sines, on which no law may be worse than the PID. What throws a table behind a spring depends on the frequency: the short
 /// sines are at 3 to 10 Hz, and many of their cycles count, for an axis that sticks does not do the same in each. The last ones are slow, or
 /// longer at a moderate speed: they show an axis that meets less friction at such a speed than is fed forward.
-pub(super) const SMALL_SINES: [SmallSine; 13] = [
+pub(super) const SMALL_SINES: [SmallSine; 14] = [
     small(0.02, 0.6, 9),
     small(0.02, 0.9, 9),
     small(0.02, 1.2, 9),
@@ -79,6 +79,7 @@ pub(super) const SMALL_SINES: [SmallSine; 13] = [
     small(0.4, 0.7, 2),
     small(0.6, 0.45, 1),
     small(0.8, 1.1, 2),
+    small(0.9, 0.2, 1),
 ];
 /// Number of the small sines, the short ones, on which a law has to keep its margin: there the table is thrown by what is fed forward
 /// beyond its friction.
