@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
+use quadrant_link::frame::DELIMITER;
 use rigless::device::ResetCause;
 use rigless::emulator::{self, AccessKind, Driver, Host, Settled, Start, Stop};
 use rigless::image::Image;
@@ -44,7 +45,30 @@ pub struct Subject {
 /// Request of the scenario to the model's thread.
 enum Order {
     Do(Task),
-    RunUntil(u64, SyncSender<()>),
+    RunUntil(Target),
+}
+
+/// The next stop of the scenario.
+struct Target {
+    /// At the latest, ns.
+    at: u64,
+    watch: Option<Watch>,
+    /// Told the instant, and whether what was watched for came.
+    reached: SyncSender<(u64, bool)>,
+}
+
+/// An event that a scenario waits for, looked for in the model's thread: a turn to the scenario's and back costs some milliseconds on
+/// a busy computer.
+struct Watch {
+    step: u64,
+    next: u64,
+    came: Box<dyn FnMut(&World) -> bool + Send>,
+}
+
+impl std::fmt::Debug for Target {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} ns", self.at)
+    }
 }
 
 type Task = Box<dyn FnOnce(&mut World, &mut Session<Nucleo>, &mut dyn Host, VirtualNanos) + Send>;
@@ -112,7 +136,7 @@ pub struct TickRecord {
 pub struct World {
     wiring: &'static Wiring,
     orders: Receiver<Order>,
-    target: Option<(u64, SyncSender<()>)>,
+    target: Option<Target>,
     /// True if the axes move as their amplifiers' voltages say; else by `spin`.
     pub plant: bool,
     /// Speed of each encoder without a plant, counts/s.
@@ -134,6 +158,10 @@ pub struct World {
     pub ticks: Ticks,
     /// Changes of the enable line: time in ns, level.
     pub enables: Vec<(u64, bool)>,
+    /// Changes of the line ALARM: the same.
+    pub alarms: Vec<(u64, bool)>,
+    /// Levels of another control's lines that are yet to come: time in ns, line (step, direction), level.
+    pub train: VecDeque<(u64, usize, bool)>,
     /// Feeds of the watchdog: the last one and the longest time between two, ns.
     pub feeds: (u64, u64),
     /// Restarts: time in ns, cause.
@@ -232,10 +260,15 @@ impl World {
         self.edges.make_contiguous().sort_by_key(|edge| edge.0);
     }
 
-    fn note_enable(&mut self, board: &mut Nucleo, now: u64) {
-        let level = board.is_enabled();
-        if self.enables.last().is_none_or(|last| last.1 != level) {
-            self.enables.push((now, level));
+    fn note_outputs(&mut self, board: &mut Nucleo, now: u64) {
+        for (changes, at) in [
+            (&mut self.enables, self.wiring.enable),
+            (&mut self.alarms, self.wiring.pulses.alarm),
+        ] {
+            let level = board.level(at);
+            if changes.last().is_none_or(|last| last.1 != level) {
+                changes.push((now, level));
+            }
         }
     }
 
@@ -254,6 +287,9 @@ impl World {
         board.drive_all(now);
         for axis in 0..3 {
             self.lines(board, now, axis);
+        }
+        for line in 0..2 {
+            board.pulse_line(now, line, false);
         }
     }
 }
@@ -310,7 +346,7 @@ impl Driver<Nucleo> for World {
             }
             address if self.wiring.ports.contains(&address) => {
                 let board = session.board_mut();
-                self.note_enable(board, now.0);
+                self.note_outputs(board, now.0);
                 // MODER, AFRL, AFRH: the lines of the encoders reach their timers, or no longer.
                 if matches!(address & 0x3FF, 0 | 0x20 | 0x24) {
                     for axis in 0..3 {
@@ -331,7 +367,7 @@ impl Driver<Nucleo> for World {
         let now = stop.at.0;
         self.note_resets(session, stop.at);
         let board = session.board_mut();
-        self.note_enable(board, now);
+        self.note_outputs(board, now);
         if now >= self.next_step {
             self.next_step = now + STEP_NS;
             self.plan_edges(board, now);
@@ -341,6 +377,10 @@ impl Driver<Nucleo> for World {
             self.shown[axis] = count;
             self.lines(board, stop.at, axis);
         }
+        while let Some(&(_, line, level)) = self.train.front().filter(|edge| edge.0 <= now) {
+            self.train.pop_front();
+            board.pulse_line(stop.at, line, level);
+        }
         while let Some(place) = self.pulses.iter().position(|pulse| pulse.0 <= now) {
             let (_, axis, line, level) = self.pulses.remove(place);
             board.encoder_line(stop.at, axis, line, level);
@@ -349,27 +389,37 @@ impl Driver<Nucleo> for World {
             self.next_log = now + LOG_NS;
             self.log.drain(host, now);
         }
-        if self.target.as_ref().is_none_or(|target| now >= target.0) {
-            if let Some((_, reached)) = self.target.take() {
-                reached.send(()).ok()?;
-            }
-            loop {
-                match self.orders.recv().ok()? {
-                    Order::Do(task) => task(self, session, host, stop.at),
-                    Order::RunUntil(at, reached) if at > now => {
-                        self.target = Some((at, reached));
-                        break;
-                    }
-                    Order::RunUntil(_, reached) => reached.send(()).ok()?,
+        if let Some(mut target) = self.target.take() {
+            let came = target.watch.as_mut().is_some_and(|watch| {
+                let due = now >= watch.next;
+                if due {
+                    watch.next = now + watch.step;
                 }
+                due && (watch.came)(self)
+            });
+            if came || now >= target.at {
+                target.reached.send((now, came)).ok()?;
+            } else {
+                self.target = Some(target);
+            }
+        }
+        while self.target.is_none() {
+            match self.orders.recv().ok()? {
+                Order::Do(task) => task(self, session, host, stop.at),
+                Order::RunUntil(target) if target.at > now => self.target = Some(target),
+                Order::RunUntil(target) => target.reached.send((now, false)).ok()?,
             }
         }
         let mut next = self.next_step.min(self.next_log);
-        next = self
-            .target
-            .iter()
-            .fold(next, |next, target| next.min(target.0));
+        if let Some(target) = &self.target {
+            next = next.min(target.at);
+            next = target
+                .watch
+                .iter()
+                .fold(next, |next, watch| next.min(watch.next));
+        }
         next = self.edges.front().map_or(next, |edge| next.min(edge.0));
+        next = self.train.front().map_or(next, |edge| next.min(edge.0));
         next = self
             .pulses
             .iter()
@@ -461,30 +511,48 @@ impl Bench {
 
     /// Lets time pass, s.
     pub fn run_for(&mut self, seconds: f64) {
-        let until = self.now + (seconds * 1e9) as u64;
-        let (reached, reports) = sync_channel(1);
-        self.order(Order::RunUntil(until, reached));
-        if reports.recv().is_err() {
-            self.give_up();
-        }
-        self.now = until;
+        self.run(seconds, None);
     }
 
-    /// Lets time pass until something holds, looking every `step` seconds, `limit` seconds at most. Returns whether it did.
-    pub fn run_while(
+    /// Lets time pass until something has come, looking every `step` seconds, `limit` seconds at most. Returns whether it did.
+    pub fn run_until(
         &mut self,
         limit: f64,
         step: f64,
-        mut holds: impl FnMut(&mut Self) -> bool,
+        came: impl FnMut(&World) -> bool + Send + 'static,
     ) -> bool {
-        let end = self.now + (limit * 1e9) as u64;
-        while self.now < end {
-            if holds(self) {
-                return true;
-            }
-            self.run_for(step);
-        }
-        holds(self)
+        let watch = Watch {
+            step: (step * 1e9) as u64,
+            next: self.now,
+            came: Box::new(came),
+        };
+        self.run(limit, Some(watch))
+    }
+
+    /// Lets time pass until the board has sent the end of a frame, and something else if it comes first.
+    pub fn run_until_frame(
+        &mut self,
+        limit: f64,
+        step: f64,
+        mut or: impl FnMut(&World) -> bool + Send + 'static,
+    ) -> bool {
+        let line = self.line.clone();
+        self.run_until(limit, step, move |world| {
+            let line = line.lock().expect("the line");
+            line.from_board.contains(&DELIMITER) || or(world)
+        })
+    }
+
+    fn run(&mut self, seconds: f64, watch: Option<Watch>) -> bool {
+        let at = self.now + (seconds * 1e9) as u64;
+        let (reached, reports) = sync_channel(1);
+        self.order(Order::RunUntil(Target { at, watch, reached }));
+        let Ok((now, came)) = reports.recv() else {
+            self.give_up();
+        };
+        // A stop may be late by an instruction.
+        self.now = if came { now } else { at };
+        came
     }
 
     /// Present instant, ns.
@@ -642,6 +710,8 @@ fn run(
         log: Log::new(&elf, symbols.get("_SEGGER_RTT").ok())?,
         ticks: Ticks::default(),
         enables: Vec::new(),
+        alarms: Vec::new(),
+        train: VecDeque::new(),
         feeds: (0, 0),
         resets: Vec::new(),
         chip: chip.clone(),

@@ -10,6 +10,7 @@ use rigless::machine::{Board, Target, armv7m};
 use rigless::mcu::{Mcu, Operate};
 use rigless::snapshot::{Error as SnapshotError, Reader, Store, Writer};
 use rigless::soc::st::gpio::Pin;
+use rigless::soc::st::tim::Channel;
 use rigless::soc::stm32f427::{self, Stm32f427};
 use rigless::soc::stm32h743::{self, Stm32h743};
 use rigless::soc::{Error, Width};
@@ -71,6 +72,15 @@ impl uart::Peer for LineEnd {
     }
 }
 
+/// An input of a timer, at its pin.
+struct TimerInput {
+    at: At,
+    /// The alternate function that leads the pin to the timer.
+    function: u8,
+    timer: TimerModel,
+    channel: u8,
+}
+
 /// The chip.
 #[derive(Debug)]
 pub enum Chip {
@@ -105,9 +115,9 @@ impl Store for Nucleo {
     }
 }
 
-/// Hangs the converter's wires and the link's line on a chip, and fits crystal and supply.
+/// Hangs the converter's wires, the link's line and a serial encoder on a chip, and fits crystal and supply.
 macro_rules! fit {
-    ($chip:expr, $family:ident, $wiring:expr, $converter:expr, $line:expr, $hse_hz:expr) => {{
+    ($chip:expr, $family:ident, $wiring:expr, $converter:expr, $line:expr, $encoder:expr, $hse_hz:expr) => {{
         $chip.rcc.attach_crystals($hse_hz, 0);
         $chip.set_supply(3300);
         // /LDAC and /CLR are no chip selects of the bus; an SPI that is not used reports their edges.
@@ -121,12 +131,13 @@ macro_rules! fit {
             };
             $chip.spi[spi].attach_selected(End::new(wire, $converter), select);
         }
+        $chip.spi[$wiring.serial_spi].attach(CableEnd($encoder.clone()));
         $chip.usart[$wiring.usart].attach(LineEnd($line.clone()));
     }};
 }
 
 impl Nucleo {
-    /// A board with a converter, a link's line, a serial encoder where it has an input for it, and a rate at OSC_IN, Hz.
+    /// A board with a converter, a link's line, a serial encoder, and a rate at OSC_IN, Hz.
     pub fn new(
         subject: &Subject,
         converter: &Shared,
@@ -138,14 +149,12 @@ impl Nucleo {
         let chip = match wiring.family {
             Family::F4 => {
                 let mut chip = Box::new(Stm32f427::new()?);
-                fit!(chip, stm32f427, wiring, converter, line, hse_hz);
-                // SPI3.
-                chip.spi[2].attach(CableEnd(encoder.clone()));
+                fit!(chip, stm32f427, wiring, converter, line, encoder, hse_hz);
                 Chip::F4(chip)
             }
             Family::H7 => {
                 let mut chip = Box::new(Stm32h743::new()?);
-                fit!(chip, stm32h743, wiring, converter, line, hse_hz);
+                fit!(chip, stm32h743, wiring, converter, line, encoder, hse_hz);
                 Chip::H7(chip)
             }
         };
@@ -206,49 +215,74 @@ impl Nucleo {
         self.drive(now, button, up);
     }
 
-    /// Drives a line of an encoder: A, B, index. The level reaches the timer if the pin has that timer's function.
+    /// Drives a line of an encoder: A, B, index.
     pub fn encoder_line(&mut self, now: VirtualNanos, axis: usize, line: usize, high: bool) {
         let encoder = self.wiring.encoders[axis];
-        let at = encoder.lines[line];
+        let input = TimerInput {
+            at: encoder.lines[line],
+            function: encoder.function,
+            timer: encoder.timer,
+            channel: line as u8 + 1,
+        };
+        self.timer_line(now, input, high);
+    }
+
+    /// Drives a line of another control: step, direction.
+    pub fn pulse_line(&mut self, now: VirtualNanos, line: usize, high: bool) {
+        let pulses = self.wiring.pulses;
+        let input = TimerInput {
+            at: pulses.lines[line],
+            function: pulses.function,
+            timer: pulses.timer,
+            channel: line as u8 + 1,
+        };
+        self.timer_line(now, input, high);
+    }
+
+    /// Drives a pin of a timer. The level reaches the timer if the pin has that timer's function.
+    fn timer_line(&mut self, now: VirtualNanos, input: TimerInput, high: bool) {
+        let TimerInput {
+            at,
+            function,
+            timer,
+            channel,
+        } = input;
         self.drive(now, at, high);
         let pin = pin_of(at.1);
-        let function = match &mut self.chip {
+        let has = match &mut self.chip {
             Chip::F4(chip) => stm32f427::peripherals::gpio::Gpio::function(pin, chip.port(at.0).1),
             Chip::H7(chip) => stm32h743::peripherals::gpio::Gpio::function(pin, chip.port(at.0).1),
         };
-        if function != Some(encoder.function) {
+        if has != Some(function) {
             return;
         }
         let level = Level::from(high);
-        match &mut self.chip {
-            Chip::F4(chip) => {
-                use stm32f427::peripherals::tim::Channel;
-                let channel = Channel::new(line as u8 + 1).expect("a channel");
-                match encoder.timer {
-                    TimerModel::General(nth) => chip.drive_timer(now, nth, |timer, r, c| {
-                        timer.drive_input(channel, level, r, c)
-                    }),
-                    TimerModel::Advanced(nth) => {
-                        chip.drive_advanced_timer(now, nth, |timer, r, c| {
-                            timer.drive_input(channel, level, r, c)
-                        })
-                    }
-                }
+        let channel = Channel::new(channel).expect("a channel");
+        match (&mut self.chip, timer) {
+            (Chip::F4(chip), TimerModel::General(nth)) => {
+                chip.drive_timer(now, nth, |timer, r, c| {
+                    timer.drive_input(channel, level, r, c)
+                })
             }
-            Chip::H7(chip) => {
-                use stm32h743::peripherals::tim::Channel;
-                let channel = Channel::new(line as u8 + 1).expect("a channel");
-                match encoder.timer {
-                    TimerModel::General(nth) => chip.drive_timer(now, nth, |timer, r, c| {
-                        timer.drive_input(channel, level, r, c)
-                    }),
-                    TimerModel::Advanced(nth) => {
-                        chip.drive_advanced_timer(now, nth, |timer, r, c| {
-                            timer.drive_input(channel, level, r, c)
-                        })
-                    }
-                }
+            (Chip::F4(chip), TimerModel::Advanced(nth)) => {
+                chip.drive_advanced_timer(now, nth, |timer, r, c| {
+                    timer.drive_input(channel, level, r, c);
+                })
             }
+            (Chip::H7(chip), TimerModel::General(nth)) => {
+                chip.drive_timer(now, nth, |timer, r, c| {
+                    timer.drive_input(channel, level, r, c)
+                })
+            }
+            (Chip::H7(chip), TimerModel::Advanced(nth)) => {
+                chip.drive_advanced_timer(now, nth, |timer, r, c| {
+                    timer.drive_input(channel, level, r, c);
+                })
+            }
+            (Chip::H7(chip), TimerModel::Fifteen) => {
+                chip.drive_tim15(now, |timer, r, c| timer.drive_input(channel, level, r, c))
+            }
+            (Chip::F4(_), TimerModel::Fifteen) => unreachable!("this chip has no TIM15"),
         }
     }
 
@@ -268,6 +302,11 @@ impl Nucleo {
             self.peek(now, base + COUNTER),
             self.peek(now, base + CAPTURED),
         )
+    }
+
+    /// The count of another control's steps, 16 bits.
+    pub fn pulses(&mut self, now: VirtualNanos) -> u32 {
+        self.peek(now, self.wiring.pulses.base + COUNTER)
     }
 
     /// Sets the supply, mV.

@@ -64,9 +64,12 @@ impl Client {
         Err(anyhow!("no answer to ten requests"))
     }
 
-    fn answer(&mut self, bench: &mut Bench, limit_s: f64) -> Option<Result<Reply>> {
-        for _ in 0..(limit_s / LOOK_S) as u32 {
-            bench.run_for(LOOK_S);
+    /// Waits for the answer to the last request, s at most.
+    pub fn answer(&mut self, bench: &mut Bench, limit_s: f64) -> Option<Result<Reply>> {
+        let end = bench.now() + (limit_s * 1e9) as u64;
+        while bench.now() < end {
+            let left = (end - bench.now()) as f64 * 1e-9;
+            bench.run_until_frame(left, LOOK_S, |_| false);
             let answer = self.take(bench);
             if answer.is_some() {
                 return answer;

@@ -1,16 +1,18 @@
-//! Rows of the table that a run prints.
+//! Rows of the table that a run prints, as they come.
 
 use std::fmt::Display;
 
 /// Rows of a scenario.
 #[derive(Debug, Default)]
 pub struct Report {
-    /// Rows: what was done, expected, measured, whether it is as expected.
-    pub rows: Vec<(String, String, String, bool)>,
+    /// Number of them.
+    pub rows: usize,
+    /// Number of those that are not as expected.
+    pub failed: usize,
 }
 
 impl Report {
-    /// Adds a row.
+    /// Prints a row: what was done, expected, measured, whether it is as expected.
     pub fn row(
         &mut self,
         done: &str,
@@ -18,12 +20,10 @@ impl Report {
         measured: impl Display,
         passes: bool,
     ) {
-        self.rows.push((
-            done.to_owned(),
-            expected.to_string(),
-            measured.to_string(),
-            passes,
-        ));
+        let verdict = if passes { "ok  " } else { "FAIL" };
+        println!("  {verdict} {done}: expected {expected}; measured {measured}");
+        self.rows += 1;
+        self.failed += usize::from(!passes);
     }
 
     /// Adds a row whose measured value must equal the expected one.

@@ -13,6 +13,8 @@ pub enum TimerModel {
     General(usize),
     /// Advanced control.
     Advanced(usize),
+    /// TIM15 of the STM32H743.
+    Fifteen,
 }
 
 /// An encoder at its timer.
@@ -28,6 +30,23 @@ pub struct Encoder {
     pub base: u64,
     /// Bits of its counter.
     pub mask: u32,
+}
+
+/// Lines of another control.
+#[derive(Clone, Copy, Debug)]
+pub struct Pulses {
+    /// Step, direction.
+    pub lines: [At; 2],
+    /// The alternate function that leads them to the timer.
+    pub function: u8,
+    /// The timer.
+    pub timer: TimerModel,
+    /// Its base address.
+    pub base: u64,
+    /// SERVO ON, closed to ground: on.
+    pub servo_on: At,
+    /// ALARM, high while all is well.
+    pub alarm: At,
 }
 
 /// Model of the chip.
@@ -66,16 +85,22 @@ pub struct Wiring {
     pub homes: [At; 3],
     /// Enabling button, and its level while it is up.
     pub button: (At, bool),
-    /// Outputs that a resistor pulls to ground: enable, brake, /CLR.
-    pub pulled_down: [At; 3],
+    /// Outputs that a resistor pulls to ground: enable, brake, /CLR, ALARM.
+    pub pulled_down: [At; 4],
     /// x, y, z.
     pub encoders: [Encoder; 3],
+    /// Another control's, for x.
+    pub pulses: Pulses,
     /// Port of /SYNC, /LDAC and /CLR, and their numbers.
     pub converter_port: &'static str,
     /// See there.
     pub converter_pins: [u8; 3],
     /// Index of the SPI that has the bus, and of one that is not used.
     pub spi: [usize; 2],
+    /// Index of the SPI that has the serial encoder.
+    pub serial_spi: usize,
+    /// Age of its position, us (docs/serial-encoders.md); the model latches it up to a byte later.
+    pub serial_age_us: [f64; 2],
     /// Index of the link's USART.
     pub usart: usize,
     /// Address of the SPI's register that has the divider, and the place of its three bits.
@@ -132,7 +157,7 @@ pub static NUCLEO_F446RE: Wiring = Wiring {
     limits: [At(2, 0), At(2, 1), At(2, 2), At(2, 3), At(2, 4), At(2, 5)],
     homes: [At(2, 10), At(2, 11), At(2, 12)],
     button: (At(2, 13), true),
-    pulled_down: [At(2, 9), At(1, 5), At(1, 2)],
+    pulled_down: [At(2, 9), At(1, 5), At(1, 2), At(0, 12)],
     encoders: [
         Encoder {
             lines: [At(1, 8), At(1, 9), At(1, 10)],
@@ -156,9 +181,19 @@ pub static NUCLEO_F446RE: Wiring = Wiring {
             mask: 0xFFFF,
         },
     ],
+    pulses: Pulses {
+        lines: [At(1, 6), At(1, 7)],
+        function: 2,
+        timer: TimerModel::General(2),
+        base: 0x4000_0800,
+        servo_on: At(0, 11),
+        alarm: At(0, 12),
+    },
     converter_port: "GPIOB",
     converter_pins: [12, 1, 2],
     spi: [1, 0],
+    serial_spi: 2,
+    serial_age_us: [22.2, 25.2],
     usart: 1,
     // SPI2_CR1.
     spi_divider: (0x4000_3800, 3),
@@ -197,7 +232,7 @@ pub static NUCLEO_H743ZI2: Wiring = Wiring {
     limits: [At(5, 0), At(5, 1), At(5, 2), At(5, 3), At(5, 4), At(5, 5)],
     homes: [At(5, 7), At(5, 8), At(5, 9)],
     button: (At(2, 13), false),
-    pulled_down: [At(2, 9), At(2, 10), At(6, 0)],
+    pulled_down: [At(2, 9), At(2, 10), At(6, 0), At(4, 4)],
     encoders: [
         Encoder {
             lines: [At(4, 9), At(4, 11), At(4, 13)],
@@ -221,9 +256,19 @@ pub static NUCLEO_H743ZI2: Wiring = Wiring {
             mask: 0xFFFF,
         },
     ],
+    pulses: Pulses {
+        lines: [At(4, 5), At(4, 6)],
+        function: 4,
+        timer: TimerModel::Fifteen,
+        base: 0x4001_4000,
+        servo_on: At(4, 3),
+        alarm: At(4, 4),
+    },
     converter_port: "GPIOG",
     converter_pins: [2, 3, 0],
     spi: [0, 2],
+    serial_spi: 1,
+    serial_age_us: [21.0, 23.7],
     usart: 2,
     // SPI1_CFG1, MBR, and SPI1_CFG2, CPOL and CPHA.
     spi_divider: (0x4001_3008, 28),

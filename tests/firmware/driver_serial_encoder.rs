@@ -1,6 +1,7 @@
 //! Frames of serial encoders, made bit by bit as an encoder puts them out.
 
 use proptest::prelude::*;
+use quadrant::drivers::serial_encoder::times::SpiTimes;
 use quadrant::drivers::serial_encoder::{
     BRIDGE_AFTER, Content, Flaw, FrameCounts, SerialEncoder, biss, ssi,
 };
@@ -9,10 +10,7 @@ use quadrant_settings::leaves::{Range, find};
 use quadrant_settings::{CheckBit, SerialProtocol, SerialSettings, StageSettings};
 use quadrant_test_support::repeatable;
 
-#[path = "../../src/board/nucleo_f446re/serial_times.rs"]
-mod serial_times;
-
-use serial_times::{TIMER_HZ, lead_cycles, rate};
+use super::board_wiring::{nucleo_f446re, nucleo_h743zi2};
 
 /// The line's levels in the order of their bits, low behind them.
 fn shifted_in(levels: &[u8]) -> u64 {
@@ -386,68 +384,79 @@ fn the_bytes_of_a_frame_hold_it() {
     }
 }
 
+/// A board's clocks, and those of an encoder at most 10, 5.625, 3 and 1 MHz, MHz; the age of the position at 3 MHz, us; rates, Hz.
+type OfBoard = (SpiTimes, [f64; 4], f64, [f64; 3]);
+
+/// 65 bits, of which the first is the SPI's start, at 2.8125 and 3 MHz, and 2 us.
+const BOARDS: [OfBoard; 2] = [
+    (
+        nucleo_f446re::SERIAL_TIMES,
+        [5.625, 5.625, 2.8125, 0.703_125],
+        25.11,
+        [2500.0, 10e3, 15e3],
+    ),
+    (
+        nucleo_h743zi2::SERIAL_TIMES,
+        [6.0, 3.0, 3.0, 0.75],
+        23.67,
+        [2500.0, 10e3, 20e3],
+    ),
+];
+
 #[test]
-fn the_reference_boards_clock_is_the_next_below_and_its_frame_leaves_the_encoder_time_to_rest() {
-    let clock_hz = |clock_hz| {
-        let settings = SerialSettings {
-            clock_hz,
-            ..biss_c()
-        };
-        45e6 / f64::from(2 << rate(&settings))
-    };
-    assert_eq!(clock_hz(1e7), 5.625e6);
-    assert_eq!(clock_hz(5.625e6), 5.625e6);
-    assert_eq!(clock_hz(3e6), 2.8125e6);
-    assert_eq!(clock_hz(1e6), 703_125.0);
-    // 64 bits at 2.8125 MHz, and 2 us.
-    let age_us = f64::from(lead_cycles(&biss_c(), 26)) / 90.0;
-    assert!((age_us - 24.76).abs() < 0.01, "{age_us}");
-    for rate_hz in [2500.0, 10e3, 15e3] {
-        let ssi = SerialSettings {
-            protocol: SerialProtocol::Ssi,
-            ..biss_c()
-        };
-        for (settings, bits) in [(biss_c(), 32), (ssi, 18), (ssi, 32)] {
-            let mut stage = StageSettings {
-                rate_hz,
-                ..StageSettings::simulated()
+fn a_boards_clock_is_the_next_below_and_the_position_has_its_age() {
+    for (times, clocks_mhz, age_us, _) in BOARDS {
+        let clock_mhz = |clock_hz| {
+            let settings = SerialSettings {
+                clock_hz,
+                ..biss_c()
             };
-            stage.axes[0].encoder.counter_bits = bits;
-            stage.axes[0].encoder.serial = Some(settings);
-            let leaf = find("/axes/x/encoder/serial/clock_hz").expect("a setting");
-            let Range::Number(least, _) = leaf.range else {
-                panic!("no number");
-            };
-            // At the slowest clock that is allowed, and just below one of the board's.
-            let least_hz = least.value(&stage, 0);
-            for clock_hz in [least_hz, least_hz * 1.5, least_hz * 1.99] {
-                let lead = lead_cycles(
-                    &SerialSettings {
-                        clock_hz,
-                        ..settings
-                    },
-                    bits,
-                );
-                let period = f64::from(TIMER_HZ) / rate_hz;
-                assert!(
-                    f64::from(lead) < 0.74 * period,
-                    "{rate_hz} {settings:?} {bits}"
-                );
-            }
-        }
+            1e-6 * f64::from(times.spi_hz) / f64::from(2 << times.rate(&settings))
+        };
+        assert_eq!([1e7, 5.625e6, 3e6, 1e6].map(clock_mhz), clocks_mhz);
+        let lead = f64::from(times.lead_cycles(&biss_c(), 26));
+        let age = lead / f64::from(times.timer_hz) * 1e6;
+        assert!((age - age_us).abs() < 0.01, "{age}");
     }
 }
 
 #[test]
-fn the_error_bit_of_ssi_is_the_encoders_own() {
-    let decode = |level| ssi::decode(word(77, 25, Some(level)), 25, false, CheckBit::Error);
-    assert_eq!(decode(0).map(|content| content.count), Ok(77));
-    assert_eq!(decode(1), Err(Flaw::Error));
-}
-
-#[test]
-fn before_the_first_frame_the_age_is_the_largest() {
-    let mut encoder = SerialEncoder::new(&biss_c(), 26);
-    encoder.take(None);
-    assert_eq!(encoder.age(), u32::MAX);
+fn a_frame_at_any_clock_has_come_before_the_tick_and_leaves_the_encoder_time_to_rest() {
+    let ssi = SerialSettings {
+        protocol: SerialProtocol::Ssi,
+        ..biss_c()
+    };
+    for (times, _, _, rates_hz) in BOARDS {
+        for (settings, bits) in [(biss_c(), 32), (ssi, 18), (ssi, 32)] {
+            for rate_hz in rates_hz {
+                let mut stage = StageSettings {
+                    rate_hz,
+                    ..StageSettings::simulated()
+                };
+                stage.axes[0].encoder.counter_bits = bits;
+                stage.axes[0].encoder.serial = Some(settings);
+                let leaf = find("/axes/x/encoder/serial/clock_hz").expect("a setting");
+                let Range::Number(least, _) = leaf.range else {
+                    panic!("no number");
+                };
+                // At the slowest clock that is allowed, and just below one of the board's.
+                let least_hz = least.value(&stage, 0);
+                for clock_hz in [least_hz, least_hz * 1.5, least_hz * 1.99] {
+                    let settings = SerialSettings {
+                        clock_hz,
+                        ..settings
+                    };
+                    let of = || format!("{rate_hz} {settings:?} {bits}");
+                    let bit_s = f64::from(2 << times.rate(&settings)) / f64::from(times.spi_hz);
+                    let frame_s = 8.0 * settings.frame_bytes(bits) as f64 * bit_s;
+                    assert!(frame_s * rate_hz < 0.701, "{}", of());
+                    let lead = times.lead_cycles(&settings, bits);
+                    let lead_s = f64::from(lead) / f64::from(times.timer_hz);
+                    // The SPI starts within a bit; DMA and clocks take some hundred nanoseconds.
+                    assert!(lead_s > frame_s + bit_s + 1.9e-6, "{}", of());
+                    assert!(lead_s * rate_hz < 0.8, "{}", of());
+                }
+            }
+        }
+    }
 }

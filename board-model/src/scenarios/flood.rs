@@ -58,8 +58,10 @@ pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
 
     push(&bench, flood(bytes / 4));
     client.begin(&bench, Body::Disable)?;
-    let waits = |bench: &mut Bench| !bench.line.lock().expect("the line").to_board.is_empty();
-    bench.run_while(FLOOD_S, 20e-6, |bench| !waits(bench));
+    let line = bench.line.clone();
+    bench.run_until(FLOOD_S, 20e-6, move |_| {
+        line.lock().expect("the line").to_board.is_empty()
+    });
     let sent = bench.now();
     bench.run_for(0.05);
     row_off(

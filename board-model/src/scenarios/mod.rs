@@ -12,6 +12,7 @@ mod link_log;
 mod model;
 mod serial_encoder;
 mod start;
+mod step_direction;
 mod store;
 mod words;
 
@@ -57,6 +58,7 @@ pub const SCENARIOS: &[Scenario] = scenarios! {
     "inputs", "each safety input of a moving machine", inputs::run;
     "converter", "converter lost in mid-frame", converter::run;
     "serial-encoder", "x behind a BiSS-C encoder: position, age, damaged frames, cut wire, error bit", serial_encoder::run;
+    "step-direction", "pulses of another control for x: followed, too fast, jumping; SERVO ON and ALARM", step_direction::run;
     "flood", "noise and requests without a pause on the link", flood::run;
     "link-log", "the log over the link, while no probe reads it", link_log::run;
     "clock", "8 MHz missing at the start, and lost in motion", clock::run;
@@ -81,9 +83,7 @@ fn started(image: &Subject, settings: Option<&[u8]>) -> Result<Bench> {
 
 /// Waits until control ticks run.
 fn runs(bench: &mut Bench) -> bool {
-    bench.run_while(bench.wiring.start_s, 0.005, |bench| {
-        bench.with(|world, _, _| world.ticks.count > 20)
-    })
+    bench.run_until(bench.wiring.start_s, 0.005, |world| world.ticks.count > 20)
 }
 
 /// Contents of the settings' sectors after the simulated stage's settings were stored by the link.

@@ -10,7 +10,6 @@ use crate::link::Client;
 use crate::report::Report;
 use crate::scenarios::{enable, row_fault, row_off, started};
 use crate::stage::COUNT_MM;
-use crate::wiring::Family;
 
 /// Position that the encoder shows where the axis is at zero, mm.
 const OFFSET_MM: f64 = 1234.5;
@@ -22,9 +21,6 @@ const JOG_MM_S: f64 = 20.0;
 const SECOND_FRAME_S: f64 = 250e-6;
 /// The same where the first frame is found.
 const FIRST_FRAME_S: f64 = 150e-6;
-/// Age of a position: eight bytes at 2.81 MHz and 2 us (docs/serial-encoders.md); the model latches it a byte later.
-const AGE_US: [f64; 2] = [21.0, 24.8];
-
 fn settings() -> StageSettings {
     let mut settings = StageSettings::simulated();
     let x = &mut settings.axes[0];
@@ -77,18 +73,6 @@ fn jogging(image: &Subject, flash: &[u8]) -> Result<(Bench, Client)> {
 }
 
 pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
-    if image.board.family != Family::F4 {
-        let refusal = stored(image).err().map(|error| format!("{error:#}"));
-        let answer = refusal.unwrap_or_else(|| "accepted".into());
-        let refused = answer.contains("x/encoder/serial: this board reads no serial encoder");
-        report.row(
-            "a board without an input for it",
-            "refused by name",
-            answer,
-            refused,
-        );
-        return Ok(());
-    }
     let flash = stored(image)?;
     let (mut bench, mut client) = driving(image, &flash)?;
     let status = client.status(&mut bench)?;
@@ -126,20 +110,15 @@ pub(super) fn run(image: &Subject, report: &mut Report) -> Result<()> {
     report.within("following error", -20.0, 20.0, error_um, "um");
     let ages = bench.with(|world, _, _| world.ages);
     let us = |ns: u64| ns as f64 * 1e-3;
+    let [least, most] = image.board.serial_age_us;
     report.within(
         "age of the youngest position",
-        AGE_US[0],
-        AGE_US[1],
+        least,
+        most,
         us(ages.0),
         "us",
     );
-    report.within(
-        "age of the oldest position",
-        AGE_US[0],
-        AGE_US[1],
-        us(ages.1),
-        "us",
-    );
+    report.within("age of the oldest position", least, most, us(ages.1), "us");
     let ticks = bench.ticks();
     report.row(
         "instructions of a control tick, mean",

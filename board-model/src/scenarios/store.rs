@@ -1,10 +1,11 @@
 //! Settings in flash.
 
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
+use quadrant_law::control::feedback::LawKind;
 use quadrant_link::message::{Body, SettingsRequest};
 use quadrant_settings::StageSettings;
 
-use crate::bench::{Bench, Subject};
+use crate::bench::{Bench, Subject, World};
 use crate::link::{Client, provenance};
 use crate::report::Report;
 use crate::scenarios::{commissioned, resets, row_fault, row_started, runs, started};
@@ -48,27 +49,58 @@ pub(super) fn reboot(image: &Subject, report: &mut Report) -> Result<()> {
 /// Speeds at which hands turn the encoders, counts/s: counters of 16 bits pass their end every 0.3 s.
 const TURNED: [f64; 3] = [150_000.0, -200_000.0, 180_000.0];
 
+/// The slowest control rate, Hz: the models' time goes with the ticks.
+const SLOW_HZ: f64 = 2500.0;
+
+/// A set that is soon checked, for a control rate: without a plant there is no bound to search.
+fn soon_checked(rate_hz: f64) -> StageSettings {
+    let mut settings = StageSettings::simulated();
+    settings.rate_hz = rate_hz;
+    for axis in &mut settings.axes {
+        axis.plant = None;
+        axis.feedback.law = LawKind::Pid;
+        axis.feedback.pid.derivative_filter_s = 1e-3;
+    }
+    settings
+}
+
+/// Contents of the settings' sectors whose next store erases one, and the origin of the last set, which is for a control rate. A sector
+/// of 128 KiB takes some thirty stores, done at the slowest rate.
+fn full(image: &Subject, rate_hz: f64) -> Result<(Vec<u8>, String)> {
+    let slow = soon_checked(SLOW_HZ);
+    let mut bench = started(image, None)?;
+    let mut client = Client::open(&mut bench)?;
+    client.load(&mut bench, &slow, &StageSettings::default())?;
+    client.store(&mut bench, "set 0")?;
+    let mut bench = started(image, Some(&bench.settings_flash()))?;
+    let mut client = Client::open(&mut bench)?;
+    // In force with the next start.
+    client.load(&mut bench, &soon_checked(rate_hz), &slow)?;
+    trace_flash(&mut bench);
+    let most = stores(image);
+    let mut origin = String::new();
+    for number in 1..=most {
+        let flash = bench.settings_flash();
+        let next = format!("set {number}");
+        if store_until_erasure(&mut bench, &mut client, &next)?.is_some() {
+            return Ok((flash, origin));
+        }
+        origin = next;
+    }
+    bail!("no sector was erased by {most} stores")
+}
+
 pub(super) fn erase(image: &Subject, report: &mut Report) -> Result<()> {
-    let mut bench = started(image, Some(&commissioned(image)?))?;
+    let (flash, _) = full(image, StageSettings::default().rate_hz)?;
+    let mut bench = started(image, Some(&flash))?;
     let mut client = Client::open(&mut bench)?;
     trace_flash(&mut bench);
     let before = client.status(&mut bench)?;
-    let mut erased = false;
-    let most = stores(image);
-    for number in 1..=most {
-        if store_until_erasure(&mut bench, &mut client, &format!("set {number}"))?.is_some() {
-            erased = true;
-            break;
-        }
-    }
-    report.equal(
-        &format!("a sector is erased by one of {most} stores"),
-        true,
-        erased,
-    );
+    let erased = store_until_erasure(&mut bench, &mut client, "the next")?.is_some();
+    report.equal("a sector is erased by a store", true, erased);
     bench.with(|world, _, _| world.feeds.1 = 0);
     bench.spin(TURNED);
-    let answered = bench.run_while(STORE_S, 0.001, |bench| client.take(bench).is_some());
+    let answered = client.answer(&mut bench, STORE_S).is_some();
     bench.spin([0.0; 3]);
     bench.run_for(0.02);
     report.equal("the store is answered", true, answered);
@@ -115,29 +147,12 @@ const LEFT: [(&str, Left); 4] = [
 ];
 
 pub(super) fn power_cut(image: &Subject, report: &mut Report) -> Result<()> {
-    let mut bench = started(image, Some(&commissioned(image)?))?;
+    let (flash, origin) = full(image, SLOW_HZ)?;
+    let mut bench = started(image, Some(&flash))?;
     let mut client = Client::open(&mut bench)?;
     trace_flash(&mut bench);
-    let mut origin = String::from("board-run");
-    let mut erased = None;
-    let most = stores(image);
-    for number in 1..=most {
-        let next = format!("set {number}");
-        let sector = store_until_erasure(&mut bench, &mut client, &next)?;
-        if let Some(sector) = sector {
-            erased = Some(sector);
-            break;
-        }
-        origin = next;
-    }
-    let Some(sector) = erased else {
-        report.row(
-            "stores until a sector is erased",
-            format!("at most {most}"),
-            "none",
-            false,
-        );
-        return Ok(());
+    let Some(sector) = store_until_erasure(&mut bench, &mut client, "the next")? else {
+        bail!("the store erases nothing");
     };
     let (.., lowest) = image.board.flash_control;
     report.row(
@@ -198,29 +213,27 @@ fn store_until_erasure(
 ) -> Result<Option<u64>> {
     bench.with(|world, _, _| world.traced.clear());
     let (_, start, number, _) = bench.wiring.flash_control;
-    let begun = |bench: &mut Bench| {
-        bench.with(move |world, _, _| {
-            world
-                .traced
-                .iter()
-                .find(|write| write.2 >> start & 1 != 0)
-                .map(|write| write.2 >> number & 7)
-        })
+    let begun = move |world: &World| {
+        let mut writes = world.traced.iter();
+        writes
+            .find(|write| write.2 >> start & 1 != 0)
+            .map(|write| write.2 >> number & 7)
     };
     client.begin(
         bench,
         Body::Settings(SettingsRequest::Store(provenance(origin)?)),
     )?;
-    let (mut sector, mut answer) = (None, false);
-    bench.run_while(STORE_S, 0.001, |bench| {
-        sector = begun(bench);
-        answer = client.take(bench).is_some();
-        answer || sector.is_some()
-    });
-    if sector.is_some() {
-        bench.run_for(0.1);
-        return Ok(sector);
+    let end = bench.now() + (STORE_S * 1e9) as u64;
+    while bench.now() < end {
+        let left = (end - bench.now()) as f64 * 1e-9;
+        bench.run_until_frame(left, 0.001, move |world| begun(world).is_some());
+        if let Some(sector) = bench.with(move |world, _, _| begun(world)) {
+            bench.run_for(0.1);
+            return Ok(Some(sector));
+        }
+        if client.take(bench).is_some() {
+            return Ok(None);
+        }
     }
-    ensure!(answer, "a store was not answered");
-    Ok(None)
+    bail!("a store was not answered")
 }

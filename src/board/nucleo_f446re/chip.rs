@@ -8,12 +8,12 @@ use stm32f4xx_hal::pac::Interrupt;
 
 #[cfg(not(feature = "output-on-chip"))]
 pub(crate) use super::bus_times::{READING, WRITING};
-pub(crate) use super::serial_input::{FrameReport, SerialInput};
+pub(crate) use super::serial_master::{SerialMaster, SerialParts};
 #[cfg(not(feature = "output-on-chip"))]
 pub(crate) use super::spi::{Rate, Spi};
 pub(crate) use super::supply::Supply;
 pub(crate) use super::usart::Usart;
-pub(crate) use super::wiring::{ENCODER_FILTER, INPUTS};
+pub(crate) use super::wiring::{ENCODER_FILTER, INPUTS, SERIAL_TIMES};
 pub(crate) use stm32f4xx_hal::pac;
 
 /// Clock of the processor.

@@ -4,10 +4,10 @@ use stm32f4xx_hal::gpio::{PA6, PA7, PB0, PB8, PB9, PB10, PC6, PC7, PC8, Pull};
 use stm32f4xx_hal::pac::{TIM2, TIM3, TIM8};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-use super::serial_input::SerialInput;
 use crate::board::stm32::encoders::{
     Counter, Encoders, Extended, captured, narrow_counter, start_counting,
 };
+use crate::board::stm32::serial_input::SerialInput;
 
 /// TIMx_CR1: the filter clock is half the timer's (CKD = 01).
 const HALVE_FILTER_CLOCK: u32 = 0b01 << 8;

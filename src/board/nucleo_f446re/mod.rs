@@ -33,8 +33,7 @@ mod encoders;
 mod flash;
 #[cfg(feature = "output-on-chip")]
 mod on_chip;
-mod serial_input;
-mod serial_times;
+mod serial_master;
 #[cfg(not(feature = "output-on-chip"))]
 mod spi;
 mod supply;
@@ -42,7 +41,7 @@ mod usart;
 mod wiring;
 
 use stm32f4xx_hal::gpio::{PinState, Pull, Speed};
-use stm32f4xx_hal::pac::{self, DMA1, GPIOA, GPIOC, PWR, TIM4, TIM7};
+use stm32f4xx_hal::pac::{self, DMA1, GPIOA, GPIOC, PWR, TIM4, TIM6, TIM7};
 #[cfg(not(feature = "output-on-chip"))]
 use stm32f4xx_hal::pac::{DMA2, SPI2, TIM1};
 use stm32f4xx_hal::prelude::*;
@@ -52,9 +51,10 @@ use self::chip::{CORE_HZ, Supply, Usart};
 pub(crate) use self::flash::SettingsFlash;
 #[cfg(feature = "output-on-chip")]
 pub(crate) use self::on_chip::{Amplifiers, outputs_off};
-use self::serial_input::SerialInput;
+use self::serial_master::SerialParts;
 use self::wiring::INPUTS;
 use super::stm32::pulses::StepInput;
+use super::stm32::serial_input::SerialInput;
 use super::stm32::switches::pull_ups;
 use super::stm32::{self, Board, Idle, Operator, Serial, Switches, Tick, Watchdog};
 use quadrant::app::PulseLead;
@@ -146,7 +146,10 @@ impl Board {
         };
         let timers = (chip.TIM2, chip.TIM3, chip.TIM8);
         let serial_pins = (port_b.pb3, port_b.pb4);
-        let serial_input = SerialInput::new(chip.SPI3, chip.TIM6, serial_pins, &mut rcc);
+        let parts = SerialParts::new(chip.SPI3, serial_pins, &mut rcc);
+        TIM6::enable(&mut rcc);
+        TIM6::reset(&mut rcc);
+        let serial_input = SerialInput::new(parts, chip.TIM6);
         let encoders = encoders::start(timers, encoder_pins, serial_input, &mut rcc);
         // A line that is not driven rests high.
         let _ = (

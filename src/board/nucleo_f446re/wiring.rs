@@ -2,11 +2,18 @@
 
 use quadrant::drivers::input_filter::{FASTEST_COUNTS_PER_S, InputFilter, shortest_level_ns};
 use quadrant::drivers::reset_flags::ResetFlags;
+use quadrant::drivers::serial_encoder::times::SpiTimes;
 use quadrant::drivers::switch_inputs::SwitchInputs;
 
 /// The filter of all nine encoder inputs, at 90 MHz: timer 8 runs at twice that and halves its filter clock.
 pub(crate) const ENCODER_FILTER: InputFilter =
     InputFilter::strongest(90_000_000, 1, shortest_level_ns(FASTEST_COUNTS_PER_S));
+
+/// Timer 6, at the control tick's clock, and SPI 3, at that of APB 1.
+pub(crate) const SERIAL_TIMES: SpiTimes = SpiTimes {
+    timer_hz: 90_000_000,
+    spi_hz: 45_000_000,
+};
 
 /// Ports A and C.
 pub(crate) const INPUTS: SwitchInputs = SwitchInputs {

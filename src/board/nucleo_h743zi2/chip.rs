@@ -3,12 +3,12 @@
 use stm32h7::stm32h743v::Interrupt;
 
 pub(crate) use super::bus_times::{READING, WRITING};
-pub(crate) use super::encoders::{FrameReport, SerialInput};
 use super::gpio::{self, Pin};
+pub(crate) use super::serial_master::{SerialMaster, SerialParts};
 pub(crate) use super::spi::{Rate, Spi};
 pub(crate) use super::supply::Supply;
 pub(crate) use super::usart::Usart;
-pub(crate) use super::wiring::{ENCODER_FILTER, INPUTS};
+pub(crate) use super::wiring::{ENCODER_FILTER, INPUTS, SERIAL_TIMES};
 pub(crate) use stm32h7::stm32h743v as pac;
 
 /// Clock of the processor.

@@ -128,7 +128,9 @@ pub(super) fn clock_peripherals(rcc: &RCC) {
     rcc.apb1lenr().modify(|_, w| {
         w.tim3en().set_bit();
         w.tim4en().set_bit();
+        w.tim6en().set_bit();
         w.tim7en().set_bit();
+        w.spi2en().set_bit();
         w.usart3en().set_bit()
     });
     rcc.apb2enr().modify(|_, w| {
@@ -142,7 +144,9 @@ pub(super) fn clock_peripherals(rcc: &RCC) {
     rcc.apb1lrstr().modify(|_, w| {
         w.tim3rst().set_bit();
         w.tim4rst().set_bit();
+        w.tim6rst().set_bit();
         w.tim7rst().set_bit();
+        w.spi2rst().set_bit();
         w.usart3rst().set_bit()
     });
     rcc.apb2rstr().modify(|_, w| {

@@ -1,12 +1,11 @@
 //! The timers of the encoders, of 16 bits each, extended. An erase of the flash does not hold up the control tick here.
 
-use quadrant_law::encoder::EncoderReading;
-use quadrant_settings::EncoderSettings;
 use stm32h7::stm32h743v::{TIM1, TIM3, TIM4};
 
 use super::chip::FILTER_CLOCK;
 use super::gpio::{self, Pin, Pull};
 use crate::board::stm32::encoders::{Encoders, Extended, narrow_counter, start_counting};
+use crate::board::stm32::serial_input::SerialInput;
 
 static X_COUNT: Extended = Extended::new();
 static Y_COUNT: Extended = Extended::new();
@@ -16,38 +15,8 @@ narrow_counter!(TIM1, X_COUNT);
 narrow_counter!(TIM3, Y_COUNT);
 narrow_counter!(TIM4, Z_COUNT);
 
-/// The input of a serial encoder: there is none.
-pub(crate) struct SerialInput;
-
-impl SerialInput {
-    /// The board has no such input.
-    pub(crate) const IS_THERE: bool = false;
-
-    /// Prepares for the encoder of x.
-    pub(crate) fn prepare(&mut self, _encoder: &EncoderSettings, _rate_hz: u32) {}
-
-    /// The reading of this tick; none without a serial encoder.
-    #[inline(always)]
-    pub(crate) fn read(&mut self) -> Option<EncoderReading> {
-        None
-    }
-}
-
-/// The report of a serial encoder's frames: there are none.
-pub(crate) struct FrameReport;
-
-impl FrameReport {
-    /// Nothing to report.
-    pub(crate) const fn new() -> Self {
-        Self
-    }
-
-    /// A turn of the idle loop.
-    pub(crate) fn turn(&mut self) {}
-}
-
 /// Starts counting from zero. The timers are clocked and reset.
-pub(super) fn start(x: TIM1, y: TIM3, z: TIM4) -> Encoders {
+pub(super) fn start((x, y, z): (TIM1, TIM3, TIM4), serial: SerialInput) -> Encoders {
     // A line that is not driven rests high. Alternate functions: DS12110, tables of ports C to E.
     Pin::<{ gpio::E }, 9>::alternate(1, Pull::Up);
     Pin::<{ gpio::E }, 11>::alternate(1, Pull::Up);
@@ -61,5 +30,5 @@ pub(super) fn start(x: TIM1, y: TIM3, z: TIM4) -> Encoders {
     start_counting!(x, u16::MAX, FILTER_CLOCK);
     start_counting!(y, u16::MAX, FILTER_CLOCK);
     start_counting!(z, u16::MAX, FILTER_CLOCK);
-    Encoders::new(x, y, z, SerialInput)
+    Encoders::new(x, y, z, serial)
 }

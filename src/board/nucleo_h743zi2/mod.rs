@@ -7,6 +7,7 @@
 //! | encoder x: A, B, index          | PE9, PE11, PE13        | TIM1, 16 bit, extended |
 //! | encoder y: A, B, index          | PC6, PC7, PC8          | TIM3, 16 bit, extended |
 //! | encoder z: A, B, index          | PD12, PD13, PD14       | TIM4, 16 bit, extended |
+//! | serial encoder x: MA, SLO       | PB10, PB15             | SPI2, TIM6, DMA1; instead of A, B, index |
 //! | DAC: SCLK, SDIN, SDO            | PA5, PB5, PA6          | SPI1, DMA1 |
 //! | DAC: /SYNC, /LDAC, /CLR         | PG2, PG3, PG0          | TIM8 and DMA2, /CLR by hand |
 //! | amplifier enable                | PC9, high enables      | |
@@ -31,6 +32,7 @@ mod encoders;
 mod flash;
 mod gpio;
 mod memory;
+mod serial_master;
 mod spi;
 mod supply;
 mod usart;
@@ -43,9 +45,11 @@ use self::chip::pac::{self, DMAMUX1};
 use self::chip::{CORE_HZ, Spi, Supply, Usart};
 pub(crate) use self::flash::SettingsFlash;
 use self::gpio::{Pin, Pull};
+use self::serial_master::SerialParts;
 use self::wiring::INPUTS;
 use super::stm32::converter_bus::{self, ConverterBus};
 use super::stm32::pulses::StepInput;
+use super::stm32::serial_input::SerialInput;
 use super::stm32::switches::pull_ups;
 use super::stm32::{self, Amplifiers, Board, Idle, Operator, Serial, Switches, Tick, Watchdog};
 
@@ -103,7 +107,10 @@ impl Board {
                     .modify(|r, w| w.bits(r.bits() & !(3 * pull_ups(pins))));
             }
         }
-        let encoders = encoders::start(chip.TIM1, chip.TIM3, chip.TIM4);
+        scale(&chip.TIM6);
+        let serial_input = SerialInput::new(SerialParts(chip.SPI2), chip.TIM6);
+        let timers = (chip.TIM1, chip.TIM3, chip.TIM4);
+        let encoders = encoders::start(timers, serial_input);
         // A line that is not driven rests high.
         Pin::<{ gpio::E }, 5>::alternate(4, Pull::Up);
         chip::Direction::alternate(4, Pull::Up);
@@ -115,10 +122,7 @@ impl Board {
         );
         let serial = Serial::new(Usart::new(chip.USART3), chip.DMA1);
         stm32::report_brown_out(supply::brown_out_level(&chip.FLASH));
-        // In force with the update that the generation makes (RM0433, 42.4: PSC, EGR), of which the flag remains.
-        chip.TIM7.psc().write(|w| w.psc().set(1));
-        chip.TIM7.egr().write(|w| w.ug().set_bit());
-        chip.TIM7.sr().write(|w| w.uif().clear());
+        scale(&chip.TIM7);
         cortex_m::peripheral::DWT::unlock();
         Self {
             encoders,
@@ -136,15 +140,24 @@ impl Board {
     }
 }
 
+/// Sets the prescaler of a basic timer to two. It is in force with the update that the generation makes (RM0433, 42.4: PSC, EGR), of
+/// which the flag remains.
+fn scale(timer: &pac::tim6::RegisterBlock) {
+    timer.psc().write(|w| w.psc().set(1));
+    timer.egr().write(|w| w.ug().set_bit());
+    timer.sr().write(|w| w.uif().clear());
+}
+
 /// Selects the requests of the streams: channel n of DMAMUX 1 is stream n of DMA 1, channel 8 + n stream n of DMA 2 (RM0433, 17.3.2).
 fn route_requests(router: &DMAMUX1) {
-    /// DMAREQ_ID (table 124): TIM8_CH1, TIM8_CH2, SPI1_RX, USART3_RX, USART3_TX.
-    const ROUTES: [(usize, u32); 5] = [
+    /// DMAREQ_ID (table 124): TIM8_CH1, TIM8_CH2, SPI1_RX, USART3_RX, USART3_TX, TIM6_UP.
+    const ROUTES: [(usize, u32); 6] = [
         (8 + converter_bus::PINS, 47),
         (8 + converter_bus::BYTES, 48),
         (converter_bus::RECEIVER, 37),
         (stm32::serial::RECEIVER, 45),
         (stm32::serial::SENDER, 46),
+        (stm32::serial_input::KICK, 69),
     ];
     for (channel, request) in ROUTES {
         // SAFETY: the values are the manual's.

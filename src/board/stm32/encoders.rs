@@ -15,7 +15,8 @@ use quadrant::hal;
 use quadrant_law::encoder::EncoderReading;
 use quadrant_settings::EncoderSettings;
 
-use crate::board::chip::{ENCODER_FILTER, SerialInput, X, Y, Z};
+use super::serial_input::SerialInput;
+use crate::board::chip::{ENCODER_FILTER, X, Y, Z};
 
 /// TIMx_CCMR1: channels 1 and 2 are inputs from their own pins (CC1S = CC2S = 01), filtered (IC1F, IC2F).
 pub(crate) const CAPTURE_A_B: u32 = (0b01 | (ENCODER_FILTER.icf as u32) << 4) * 0x0101;
@@ -132,7 +133,7 @@ impl Encoders {
 }
 
 impl hal::Encoders for Encoders {
-    const SERIAL_AXES: [bool; 3] = [SerialInput::IS_THERE, false, false];
+    const SERIAL_AXES: [bool; 3] = [true, false, false];
 
     fn prepare(&mut self, [x, ..]: &[EncoderSettings; 3], rate_hz: u32) {
         self.serial.prepare(x, rate_hz);

@@ -7,13 +7,13 @@
 //! | `CONTROL_TICK`, `DISPATCHERS` | `device` |
 //! | `Enable`, `Brake`, `Clear`, `Sync`, `Load`, `lines_off` | `amplifiers`, `converter_bus` |
 //! | `Spi`, `Rate`, `ConverterTimer`, `TIMER_STREAM`, `SPI_STREAM`, `port_address`, `set_lines`, `SYNC`, `LOAD`, `PATIENCE`, `WRITING`, `READING` | `converter_bus` |
-//! | `X`, `Y`, `Z`, `SerialInput` | `encoders` |
+//! | `X`, `Y`, `Z` | `encoders` |
+//! | `SerialParts`, `SerialMaster`, `SERIAL_TIMES` | `serial_input` |
 //! | `Usart`, `UART_STREAM` | `serial` |
 //! | `StepTimer`, `ServoOn`, `Alarm`, `is_backwards`, `ENCODER_FILTER`, `FILTER_CLOCK` | `pulses` |
 //! | `Supply`, `levels`, `INPUTS` | `switches` |
 //! | `freeze_in_debug` | `watchdog` |
 //! | `Button`, `is_pressed` | [`Operator`] |
-//! | `FrameReport` | [`Idle`] |
 
 #[cfg(not(feature = "output-on-chip"))]
 pub(super) mod amplifiers;
@@ -25,6 +25,7 @@ pub(super) mod encoders;
 pub(super) mod pulses;
 pub(super) mod rtt;
 pub(super) mod serial;
+pub(super) mod serial_input;
 pub(super) mod settings_flash;
 pub(super) mod switches;
 pub(super) mod tick;
@@ -117,14 +118,14 @@ impl Operator {
 
 /// The work of the idle loop.
 pub(crate) struct Idle {
-    frames: chip::FrameReport,
+    frames: serial_input::FrameReport,
 }
 
 impl Idle {
     /// An idle loop that has not turned.
     pub(super) const fn new() -> Self {
         Self {
-            frames: chip::FrameReport::new(),
+            frames: serial_input::FrameReport::new(),
         }
     }
 

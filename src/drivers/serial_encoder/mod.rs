@@ -20,6 +20,7 @@
 
 pub mod biss;
 pub mod ssi;
+pub mod times;
 
 use quadrant_law::encoder::EncoderReading;
 use quadrant_settings::{CheckBit, SerialProtocol, SerialSettings};
