@@ -11,7 +11,7 @@ use probe_rs::architecture::arm::{ArmDebugInterface, ArmError};
 use probe_rs::config::Registry;
 use probe_rs::flashing::{
     DownloadOptions, ElfLoader, ElfOptions, FlashProgress, ProgressEvent, ProgressOperation,
-    download_file_with_options,
+    build_loader,
 };
 use probe_rs::probe::Probe;
 use probe_rs::rtt::find_rtt_control_block_in_raw_file;
@@ -42,6 +42,13 @@ pub(super) fn flash(job: &Job, stay: bool) -> anyhow::Result<()> {
         .attach(target, Permissions::default())
         .context(NO_ANSWER)?;
 
+    let loader = build_loader(
+        &mut session,
+        job.elf,
+        ElfLoader(ElfOptions::default()),
+        None,
+    )
+    .with_context(|| format!("{}: nothing was erased", job.elf.display()))?;
     let bar = share("erasing");
     bar.set_length(0);
     let mut options = DownloadOptions::default();
@@ -52,13 +59,9 @@ pub(super) fn flash(job: &Job, stay: bool) -> anyhow::Result<()> {
         ProgressEvent::Progress { size, .. } => bar.inc(size),
         _ => {}
     });
-    let loader = ElfLoader(ElfOptions::default());
-    download_file_with_options(&mut session, job.elf, loader, options).with_context(|| {
-        format!(
-            "{} is not on the board as a whole: flash it again",
-            job.elf.display()
-        )
-    })?;
+    loader
+        .commit(&mut session, options)
+        .context("the image is not on the board as a whole: flash it again")?;
     bar.finish_and_clear();
     session
         .core(0)?

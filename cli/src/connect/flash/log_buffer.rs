@@ -2,6 +2,8 @@
 //!
 //! The reader of probe-rs would halt the processor to attach to it, and with it the control of the axes.
 
+use std::ops::Range;
+
 use anyhow::{Context, ensure};
 use probe_rs::MemoryInterface;
 use probe_rs::architecture::arm::ArmError;
@@ -55,16 +57,44 @@ impl LogBuffer {
         let mut words = [0; 5];
         memory.read_32(self.channel, &mut words)?;
         let [_, buffer, size, write, read] = words;
-        // While the board starts, there is none.
-        if size > LONGEST || read >= size || write >= size {
-            return Ok(Vec::new());
-        }
-        let end = if write < read { size } else { write };
-        let mut bytes = vec![0; (end - read) as usize];
+        let piece = piece(size, write, read);
+        let mut bytes = vec![0; piece.len()];
         if !bytes.is_empty() {
-            memory.read_8(u64::from(buffer) + u64::from(read), &mut bytes)?;
-            memory.write_word_32(self.channel + READ, end % size)?;
+            memory.read_8(u64::from(buffer) + u64::from(piece.start), &mut bytes)?;
+            memory.write_word_32(self.channel + READ, piece.end % size)?;
         }
         Ok(bytes)
+    }
+}
+
+/// Returns the bytes of a buffer that wait to be read, up to its end. While the board starts, there are none.
+fn piece(size: u32, write: u32, read: u32) -> Range<u32> {
+    if size > LONGEST || read >= size || write >= size {
+        0..0
+    } else if write < read {
+        read..size
+    } else {
+        read..write
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_taken_in_pieces_that_end_with_the_buffer() {
+        assert_eq!(piece(1024, 10, 3), 3..10);
+        assert_eq!(piece(1024, 10, 1000), 1000..1024);
+        assert_eq!(piece(1024, 10, 0), 0..10);
+        assert!(piece(1024, 10, 10).is_empty());
+    }
+
+    #[test]
+    fn a_buffer_that_the_board_has_not_set_up_has_no_bytes() {
+        assert!(piece(0, 0, 0).is_empty());
+        assert!(piece(u32::MAX, 5, 3).is_empty());
+        assert!(piece(1024, 2000, 3).is_empty());
+        assert!(piece(1024, 5, 2000).is_empty());
     }
 }
