@@ -15,6 +15,8 @@ use cyclonedx_bom::prelude::{
 };
 use xtask::command;
 
+use crate::parts::COMMAND_FEATURES;
+
 /// A file of the release that is compiled from packages.
 struct Product {
     name: &'static str,
@@ -35,7 +37,7 @@ const PRODUCTS: [Product; 6] = [
         package: "quadrant-cli",
         manifest: "Cargo.toml",
         triple: HOST,
-        features: "",
+        features: COMMAND_FEATURES,
         kind: Classification::Application,
     },
     Product {

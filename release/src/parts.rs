@@ -26,6 +26,8 @@ const SHELLS: [(&str, &str); 4] = [
 const MUSL: &str = "x86_64-unknown-linux-musl";
 /// The command's target otherwise.
 const GLIBC: &str = "x86_64-unknown-linux-gnu";
+/// Features of a release's command beyond those of a usual build: it flashes a board with nothing else installed.
+pub(crate) const COMMAND_FEATURES: &str = "flash";
 /// Licences of the project.
 const LICENCES: [&str; 2] = ["LICENSE-APACHE", "LICENSE-MIT"];
 
@@ -103,6 +105,7 @@ impl Release {
         let mut cargo = command::command("cargo");
         cargo
             .args(["build", "--release", "--package", "quadrant-cli"])
+            .args(["--features", COMMAND_FEATURES])
             .args(["--target", triple, "--target-dir", "target/release-command"])
             .env("RUSTFLAGS", self.flags());
         command::run(&mut cargo)?;

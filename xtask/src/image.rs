@@ -42,6 +42,15 @@ impl Board {
             Self::NucleoH743zi2 => Some(0x081C_0000..0x0820_0000),
         }
     }
+
+    /// The chip that an image names for programs that flash it, of a board with a debug probe.
+    pub const fn chip(self) -> Option<&'static str> {
+        match self {
+            Self::Mps2 => None,
+            Self::NucleoF446re => Some("STM32F446RETx"),
+            Self::NucleoH743zi2 => Some("STM32H743ZITx"),
+        }
+    }
 }
 
 /// The firmware's number types.

@@ -54,6 +54,9 @@ pub(crate) fn check(image: &Image, overwrite: bool) -> Result<()> {
     if let Some(settings) = image.target.board.settings() {
         settings_are_left_alone(image, &settings)?;
     }
+    if let Some(chip) = image.target.board.chip() {
+        chip_is_named(image, chip)?;
+    }
     if image.target.board == Board::NucleoF446re {
         erasing_calls_nothing(image)?;
     }
@@ -117,6 +120,28 @@ fn settings_are_left_alone(image: &Image, settings: &Range<u64>) -> Result<()> {
             settings.end
         );
     }
+    Ok(())
+}
+
+/// The image names its chip, and that name takes no memory: `quadrant connect flash` refuses another chip by it.
+fn chip_is_named(image: &Image, chip: &str) -> Result<()> {
+    const SECTION: &str = ".probe-rs.chip";
+    let file = object::File::parse(&*image.elf)?;
+    let section = file.section_by_name(SECTION);
+    let section = section.with_context(|| format!("{}: no {SECTION}", image.target))?;
+    ensure!(
+        section.data()? == chip.as_bytes(),
+        "{}: {SECTION} is not {chip}",
+        image.target
+    );
+    let object::SectionFlags::Elf { sh_flags } = section.flags() else {
+        bail!("{}: not an ELF file", image.target);
+    };
+    ensure!(
+        sh_flags & u64::from(elf::SHF_ALLOC) == 0,
+        "{}: {SECTION} takes memory",
+        image.target
+    );
     Ok(())
 }
 

@@ -211,7 +211,8 @@ pub(super) enum Command {
     Commission(CommissionOptions),
     /// Restart the machine, as after power-up; the outputs must be off.
     Reboot,
-    /// Flash firmware onto the board through its debug probe; needs probe-rs, and no connection.
+    /// Flash firmware onto the board through its debug probe, and verify it; needs no connection. The board restarts with its outputs
+    /// off.
     Flash(FlashOptions),
     /// Take commands from standard input, one a line; `#` begins a comment. The same as no command.
     #[command(name = "-")]
@@ -462,11 +463,14 @@ pub(super) struct CommissionOptions {
 /// Options of the command `flash`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct FlashOptions {
-    /// The firmware: the ELF file that `cargo build --release` leaves in target/thumbv7em-none-eabihf/release.
+    /// The firmware: the board's ELF file of a release, or one that `cargo xtask build` has left in target/images.
     pub(super) elf: PathBuf,
-    /// The chip, as probe-rs calls it.
-    #[arg(long, default_value = "STM32F446RETx")]
-    pub(super) chip: String,
+    /// The chip, as probe-rs calls it, of an image that does not name it.
+    #[arg(long)]
+    pub(super) chip: Option<String>,
+    /// The debug probe, where several are connected: VID:PID:SERIAL, or VID:PID.
+    #[arg(long)]
+    pub(super) probe: Option<String>,
     /// Stay, and show the firmware's log (defmt) until Ctrl-C.
     #[arg(long)]
     pub(super) run: bool,
@@ -478,9 +482,12 @@ pub(super) struct LogOptions {
     /// The firmware that is on the board: the ELF file it was flashed from, for its strings.
     #[arg(long, value_name = "FILE")]
     pub(super) elf: Option<PathBuf>,
-    /// The chip, as probe-rs calls it.
-    #[arg(long, default_value = "STM32F446RETx", requires = "elf")]
-    pub(super) chip: String,
+    /// The chip, as probe-rs calls it, of an image that does not name it.
+    #[arg(long, requires = "elf")]
+    pub(super) chip: Option<String>,
+    /// The debug probe, where several are connected: VID:PID:SERIAL, or VID:PID.
+    #[arg(long, requires = "elf")]
+    pub(super) probe: Option<String>,
     /// Frames that were captured elsewhere, instead of those of a machine.
     #[arg(
         long,

@@ -1,6 +1,5 @@
 //! `identify`: measurements on the connected machine, by the code of `quadrant identify`.
 
-use anyhow::Context;
 use quadrant_cli::terminal;
 use quadrant_host::client::Client;
 use quadrant_law::axes::AxisName;
@@ -10,7 +9,7 @@ use quadrant_pages::identify::motion::motion_table;
 use quadrant_report::Table;
 use quadrant_settings::AxisSettings;
 use quadrant_tune::identify::frf::FrfSettings;
-use quadrant_tune::identify::motion::{MotionFitSettings, fit_motion, recommended};
+use quadrant_tune::identify::motion::MotionFitSettings;
 use quadrant_tune::identify::motor_constant::MotorConstantSettings;
 use quadrant_tune::identify::plant::{PlantFitSettings, Stiffness, fit_plant};
 use quadrant_tune::identify::static_friction::{Exponent, StaticFrictionSettings, fit_map};
@@ -38,18 +37,34 @@ pub(super) fn run(client: &mut Client, command: &IdentifyCommand) -> anyhow::Res
     };
     let axis = AxisName::from(options.axis);
     let travel_mm = travel_mm(client, axis, options.travel, fallback_mm)?;
-    let table = on_axis(client, axis, travel_mm, None, |test_axis, base| {
+    let Found { table, lines } = on_axis(client, axis, travel_mm, None, |test_axis, base| {
         measure(test_axis, base, command, options)
     })?;
-    let text = format!(
-        "{}\n{}: the recording",
-        table.to_text(terminal::output_width()),
-        options.out.display()
-    );
+    let mut text = table.to_text(terminal::output_width());
+    for line in &lines {
+        text += &format!("\n{line}");
+    }
+    text += &format!("\n{}: the recording", options.out.display());
     Ok(Answer::new(
         text,
-        json!({ "file": options.out, "table": table.to_csv()? }),
+        json!({ "file": options.out, "table": table.to_csv()?, "lines": lines }),
     ))
+}
+
+/// Result of a measurement.
+struct Found {
+    table: Table,
+    /// What else there is to say of it.
+    lines: Vec<String>,
+}
+
+impl From<Table> for Found {
+    fn from(table: Table) -> Self {
+        Self {
+            table,
+            lines: Vec::new(),
+        }
+    }
 }
 
 fn measure(
@@ -57,42 +72,48 @@ fn measure(
     base: &AxisSettings,
     command: &IdentifyCommand,
     options: &IdentifyOptions,
-) -> anyhow::Result<Table> {
+) -> anyhow::Result<Found> {
     match command {
         IdentifyCommand::Motion(_) => {
             let recording = motion::move_to_and_fro(test_axis, ROUNDS)?;
             recording.write_csv(&options.out)?;
-            let settings = MotionFitSettings::default();
-            let candidates = fit_motion(&recording, &settings, &|_| {})?;
-            let chosen =
-                recommended(&candidates).context("no model of the motion is one of friction")?;
-            Ok(motion_table(&chosen.model, None))
+            let fit = motion::fit(&recording, &MotionFitSettings::default(), None, None)?;
+            let model = fit.model();
+            motion::ensure_fits(model.relative_error)?;
+            let explained = motion::judge(model, model.relative_error);
+            Ok(Found {
+                table: motion_table(model, None),
+                lines: [Some(motion::plant_line(model)), explained]
+                    .into_iter()
+                    .flatten()
+                    .collect(),
+            })
         }
         IdentifyCommand::StaticFriction(_) => {
             let settings = StaticFrictionSettings::default();
             let (map, _) = friction::run_at_velocities(test_axis, base, &settings)?;
             map.write_csv(&options.out)?;
-            Ok(friction_table(&fit_map(&map, Exponent::Free)?))
+            Ok(friction_table(&fit_map(&map, Exponent::Free)?).into())
         }
         IdentifyCommand::VirginCurve(_) => {
             let (recording, _) = sine::Sine::default().measure(test_axis, base)?;
             recording.write_csv(&options.out)?;
             let known = Some(&base.friction.sliding);
             let found = virgin_curve::identify(&recording, known, &Knots::Automatic(BLOCKS))?;
-            Ok(gms_table(&found))
+            Ok(gms_table(&found).into())
         }
         IdentifyCommand::Plant(_) => {
             let found = frf::excite(test_axis, base, &FrfSettings::default())?;
             let response = &found.estimate.response;
             response.write_csv(&options.out)?;
             let [parameters, _] = plant_tables(&fit_plant(response, &plant_fit())?);
-            Ok(parameters)
+            Ok(parameters.into())
         }
         IdentifyCommand::MotorConstant(_) => {
             let settings = MotorConstantSettings::default();
             let found = motor_constant::step_voltage(test_axis, base, &settings)?;
             found.recording.write_csv(&options.out)?;
-            Ok(motor_constant_table(&found, None))
+            Ok(motor_constant_table(&found, None).into())
         }
     }
 }

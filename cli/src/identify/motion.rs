@@ -117,46 +117,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         knots_mm: arguments.knots_um.0.iter().map(|um| 1e-3 * um).collect(),
         dead_time_s: arguments.dead_time_s,
     };
-    let bar = share("fitting models");
-    let mut candidates = fit_motion(&recording, &settings, &|done| {
-        bar.set_position((1000.0 * done) as u64);
-    })?;
-    bar.set_message("refining the best");
     let other = match &arguments.validate {
         Some(path) => Some(recorded::read_motion(path, &arguments.reading())?),
         None => None,
     };
-    let best = match &other {
-        Some(other) => recommended_by(&candidates, other, &settings)?,
-        None => recommended(&candidates),
-    };
-    let best = best.context("no model of the record is one of friction")?;
-    // What the record hardly determines, its motion in open loop does not determine either, and the search takes a minute.
-    let doubtful = !best.model.doubts().is_empty();
-    let refined = (!doubtful).then(|| refined(best, &recording, &settings));
-    bar.set_message("running the models");
-    let signals = Signals::new(&recording, &settings);
-    let rerun = |candidate: &Candidate| Reruns {
-        open_loop: replay_open_loop(&candidate.model, &recording, &signals),
-        closed_loop: cascade
-            .as_ref()
-            .map(|cascade| replay_closed_loop(&candidate.model, &recording, &signals, cascade)),
-    };
-    let is_best = |candidate: &Candidate| std::ptr::eq(candidate, best);
-    let mut chosen = candidates
-        .iter()
-        .position(is_best)
-        .context("the recommended model is none of the candidates")?;
-    // A search that found no end, or nothing better, leaves the best as it is.
-    if let Some(Ok(refined)) = refined {
-        let rms = |candidate: &Candidate| rerun(candidate).open_loop.position_rms_mm;
-        if refined.explains_as_well_as(best) && rms(&refined) < rms(best) {
-            chosen = candidates.len();
-        }
-        candidates.push(refined);
-    }
-    let reruns: Vec<Reruns> = candidates.iter().map(rerun).collect();
-    bar.finish_and_clear();
+    let Fit {
+        candidates,
+        reruns,
+        chosen,
+    } = fit(&recording, &settings, other.as_ref(), cascade.as_ref())?;
     let mut tables = vec![candidates_table(&candidates, &reruns)];
     let model = &candidates[chosen].model;
     let mut error = model.relative_error;
@@ -182,13 +151,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         destination,
         ..
     } = arguments;
-    let explained = 100.0 * (1.0 - error).max(0.0);
-    ensure!(
-        error <= LARGEST_ERROR,
-        "no model fits: the best explains {explained:.0} % of the voltage, and less than {:.0} % is no result; is the voltage that of this \
-         axis, and does nothing else move it?",
-        100.0 * (1.0 - LARGEST_ERROR)
-    );
+    ensure_fits(error)?;
     let records: Vec<PathBuf> = arguments
         .record
         .iter()
@@ -206,6 +169,102 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             put_friction(settings, model.friction_settings());
         },
     )?;
+    if let Some(explained) = judge(model, error) {
+        say!("{explained}");
+    }
+    Ok(())
+}
+
+/// Models of a recorded motion.
+pub(crate) struct Fit {
+    candidates: Vec<Candidate>,
+    /// The motion that each of them predicts.
+    reruns: Vec<Reruns>,
+    /// Number of the recommended one.
+    chosen: usize,
+}
+
+impl Fit {
+    /// The recommended model.
+    pub(crate) fn model(&self) -> &MotionModel {
+        &self.candidates[self.chosen].model
+    }
+}
+
+/// Fits all models to a recorded motion, judges them on another if there is one, and refines the best.
+///
+/// # Errors
+/// A record that no model can be fitted to.
+pub(crate) fn fit(
+    recording: &Recording,
+    settings: &MotionFitSettings,
+    other: Option<&Recording>,
+    cascade: Option<&CascadeLoop>,
+) -> anyhow::Result<Fit> {
+    let bar = share("fitting models");
+    let mut candidates = fit_motion(recording, settings, &|done| {
+        bar.set_position((1000.0 * done) as u64);
+    })?;
+    bar.set_message("refining the best");
+    let best = match other {
+        Some(other) => recommended_by(&candidates, other, settings)?,
+        None => recommended(&candidates),
+    };
+    let best = best.context("no model of the record is one of friction")?;
+    // What the record hardly determines, its motion in open loop does not determine either, and the search takes a minute.
+    let doubtful = !best.model.doubts().is_empty();
+    let refined = (!doubtful).then(|| refined(best, recording, settings));
+    bar.set_message("running the models");
+    let signals = Signals::new(recording, settings);
+    let rerun = |candidate: &Candidate| Reruns {
+        open_loop: replay_open_loop(&candidate.model, recording, &signals),
+        closed_loop: cascade
+            .map(|cascade| replay_closed_loop(&candidate.model, recording, &signals, cascade)),
+    };
+    let is_best = |candidate: &Candidate| std::ptr::eq(candidate, best);
+    let mut chosen = candidates
+        .iter()
+        .position(is_best)
+        .context("the recommended model is none of the candidates")?;
+    // A search that found no end, or nothing better, leaves the best as it is.
+    if let Some(Ok(refined)) = refined {
+        let rms = |candidate: &Candidate| rerun(candidate).open_loop.position_rms_mm;
+        if refined.explains_as_well_as(best) && rms(&refined) < rms(best) {
+            chosen = candidates.len();
+        }
+        candidates.push(refined);
+    }
+    let reruns = candidates.iter().map(rerun).collect();
+    bar.finish_and_clear();
+    Ok(Fit {
+        candidates,
+        reruns,
+        chosen,
+    })
+}
+
+/// Share of the voltage that a model with a relative error explains, %.
+fn explained(error: f64) -> f64 {
+    100.0 * (1.0 - error).max(0.0)
+}
+
+/// Checks that a model explains enough of the voltage to be a result.
+///
+/// # Errors
+/// It does not.
+pub(crate) fn ensure_fits(error: f64) -> anyhow::Result<()> {
+    ensure!(
+        error <= LARGEST_ERROR,
+        "no model fits: the best explains {:.0} % of the voltage, and less than {:.0} % is no result; is the voltage that of this \
+         axis, and does nothing else move it?",
+        explained(error),
+        explained(LARGEST_ERROR)
+    );
+    Ok(())
+}
+
+/// Warns of what is doubtful about a model; returns a line about one that explains the voltage.
+pub(crate) fn judge(model: &MotionModel, error: f64) -> Option<String> {
     for doubt in model.doubts() {
         warn!(
             "warning: {} is known to ± {:.0} % only, and the plant is made of it: record {}",
@@ -216,16 +275,19 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     if error > DOUBTFUL_ERROR {
         warn!(
-            "warning: the model explains {explained:.0} % of the voltage only; what is missing in it is in no parameter"
+            "warning: the model explains {:.0} % of the voltage only; what is missing in it is in no parameter",
+            explained(error)
         );
-    } else {
-        say!("The model explains {explained:.1} % of the voltage");
+        return None;
     }
-    Ok(())
+    Some(format!(
+        "The model explains {:.1} % of the voltage",
+        explained(error)
+    ))
 }
 
 /// The plant of a model in a line, in the units of `quadrant design`.
-fn plant_line(model: &MotionModel) -> String {
+pub(crate) fn plant_line(model: &MotionModel) -> String {
     let plant = model.plant();
     format!(
         "Plant: gain {:.2} mm/(V s²), damping {:.2} 1/s, delay {:.6} s",

@@ -203,6 +203,30 @@ fn a_step_is_the_same_on_a_machine_and_in_the_console() {
     assert_eq!(dumped.stage.axes[0], fresh.axes[0]);
 }
 
+/// The sentences about a model.
+fn sentences(said: &str) -> Vec<&str> {
+    let is_one = |line: &&str| line.starts_with("Plant: ") || line.starts_with("The model ");
+    said.lines().filter(is_one).collect()
+}
+
+#[test]
+fn the_console_says_of_a_motion_what_the_shell_says_of_its_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let connect = "connect --simulated=commissioned identify motion x --out a.csv";
+    let words: Vec<&str> = connect.split(' ').collect();
+    let (console, console_warned) = command::output(at, &words);
+    let words = ["identify", "motion", "--record", "a.csv"];
+    let (shell, shell_warned) = command::output(at, &words);
+    assert!(!sentences(&shell).is_empty(), "{shell}");
+    assert_eq!(sentences(&console), sentences(&shell));
+    let warnings = |said: &str| -> Vec<String> {
+        let is_one = |line: &&str| line.starts_with("warning: ");
+        said.lines().filter(is_one).map(str::to_owned).collect()
+    };
+    assert_eq!(warnings(&console_warned), warnings(&shell_warned));
+}
+
 #[test]
 fn a_machine_that_cannot_be_measured_is_refused_with_a_remedy() {
     let folder = tempfile::tempdir().unwrap();

@@ -13,6 +13,7 @@ mod console_settings;
 mod control_characters;
 mod design_commands;
 mod first_screen;
+mod flash;
 mod identify_commands;
 mod interrupted;
 mod kept_settings;

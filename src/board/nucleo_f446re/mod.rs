@@ -195,3 +195,10 @@ pub(crate) const RATES_HZ: (f64, f64) = (2.5e3, 1.5e4);
 
 /// The board's name.
 pub(crate) const NAME: &str = "nucleo-f446re";
+
+/// The chip, by probe-rs' name, in the section where probe-rs and `quadrant connect flash` look for it. It is in the file alone:
+/// nothing of it is loaded (`roles.x`).
+#[used]
+// SAFETY: the linker script keeps the section out of memory, and nothing refers to it.
+#[unsafe(link_section = ".probe-rs.chip")]
+static CHIP: [u8; 13] = *b"STM32F446RETx";
