@@ -92,6 +92,13 @@ impl<'a, P: Pulses> PulseLead<'a, P> {
             Some(_) => {
                 self.is_on = false;
                 self.enabling.end();
+                // As the control wants it: no alarm.
+                for name in AxisName::ALL {
+                    if self.holds[name] == Hold::Leads {
+                        self.holds[name] = Hold::Released;
+                        control.release(name);
+                    }
+                }
                 return safety.drives().then_some(Command::Disable);
             }
             None => {}

@@ -8,9 +8,9 @@ use quadrant_law::axes::AxisName;
 use quadrant_law::safety::{AxisSwitches, Switches};
 
 #[path = "../../src/board/nucleo_f446re/wiring.rs"]
-pub mod nucleo_f446re;
+pub(crate) mod nucleo_f446re;
 #[path = "../../src/board/nucleo_h743zi2/wiring.rs"]
-pub mod nucleo_h743zi2;
+pub(crate) mod nucleo_h743zi2;
 
 /// An input: true if it is at the first port, its pin, and what it says when it is high.
 type Wire = (bool, u32, Switches);

@@ -187,6 +187,7 @@ fn the_line_switches_off_at_once_and_a_second_time_counts_from_there() {
     assert!(!rig.outputs.enabled);
     rig.step(1000, 100);
     rig.run(1000);
+    assert!(!rig.alarm(), "the control itself switched off");
     assert!((rig.position_mm() - 2.0).abs() < NEAR_MM);
     rig.switch(true);
     assert!(rig.outputs.enabled && !rig.alarm());

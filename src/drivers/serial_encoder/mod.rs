@@ -1,7 +1,7 @@
 //! Absolute encoders with a serial interface, BiSS-C and SSI: from the bits that an SPI master shifted in to a reading.
 //!
-//! The master clocks some bytes a tick ([`SerialSettings::frame_bytes`]) and rests until the next one. [`SerialEncoder::take`] decodes them ([`biss`],
-//! [`ssi`]) and judges the frame:
+//! The master clocks some bytes a tick ([`SerialSettings::frame_bytes`]), just before it ([`times`]), and rests until the next one.
+//! [`SerialEncoder::take`] decodes them ([`biss`], [`ssi`]) and judges the frame:
 //!
 //! | frame | reading |
 //! |---|---|
