@@ -187,6 +187,17 @@ impl Board {
                     axis.encoder.counter_bits
                 )));
             }
+            // The pins are those of LinuxCNC's own encoder and commands.
+            for (part, holds) in [
+                ("encoder.serial", axis.encoder.serial.is_some()),
+                ("pulses", axis.pulses.is_some()),
+            ] {
+                if holds {
+                    return Err(io::Error::other(format!(
+                        "{name}/{part}: LinuxCNC reads encoders and commands by its own pins; leave the part out"
+                    )));
+                }
+            }
             let resolution_mm = axis.encoder.resolution_mm;
             joints[index] = Some(Joint {
                 name,

@@ -63,6 +63,7 @@ impl<'a, P: Pulses> PulseLead<'a, P> {
             self.states[name as usize].is_some() && stage.axes[name].pulses().is_some()
         });
         if !follows.contains(&true) {
+            self.forget();
             return None;
         }
         let seen = self.lines.read();
@@ -110,6 +111,10 @@ impl<'a, P: Pulses> PulseLead<'a, P> {
         if command.is_some() {
             return command;
         }
+        if self.waits(safety) {
+            // What a host enables later is not the control's.
+            self.holds = PerAxis::splat(Hold::Ended);
+        }
         if safety.is_enabled() {
             return self.take_hold(control, follows, &seen);
         }
@@ -118,8 +123,20 @@ impl<'a, P: Pulses> PulseLead<'a, P> {
 
     /// True if the control must not go on: a fault, outputs that could not be enabled, or an axis that no longer follows.
     fn is_alarmed(&self, safety: SafetyState) -> bool {
-        let waits = self.is_on && !self.enabling.is_under_way() && !safety.drives();
-        safety.fault().is_some() || waits || self.holds.contains(&Hold::Ended)
+        safety.fault().is_some() || self.waits(safety) || self.holds.contains(&Hold::Ended)
+    }
+
+    /// True if the line is on, and the outputs did not come on, or are off again.
+    fn waits(&self, safety: SafetyState) -> bool {
+        self.is_on && !self.enabling.is_under_way() && !safety.drives()
+    }
+
+    /// Forgets a control: its line counts only once it has been off with a setting that needs it.
+    fn forget(&mut self) {
+        self.servo_on = HoldButton::new();
+        self.is_on = false;
+        self.enabling.end();
+        self.holds = PerAxis::splat(Hold::Released);
     }
 
     /// Moves the reference of an axis that follows the steps.

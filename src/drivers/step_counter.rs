@@ -22,6 +22,8 @@ pub struct StepCounter {
     raw: u16,
     count: u32,
     backwards: bool,
+    /// The level was not that of `backwards` at the last reading, and its edge was not captured yet.
+    differs: bool,
 }
 
 impl StepCounter {
@@ -31,22 +33,29 @@ impl StepCounter {
             raw,
             count: 0,
             backwards: direction,
+            differs: false,
         }
     }
 
     /// The sum, 32 bits wide and wrapping, and true if the sense of some steps is not known.
     ///
     /// An edge that comes between the reading of the count and that of the capture is allowed for: what it counts too much, the next
-    /// reading takes back.
+    /// reading takes back. So is one whose capture is still behind the input's filter, through which the level does not come.
     #[inline(always)]
     pub const fn read(&mut self, seen: StepReading) -> (u32, bool) {
         let mut lost = seen.overrun;
         if let Some(turned) = seen.turned {
             self.add(turned);
             self.backwards = !self.backwards;
-        } else if seen.direction != self.backwards {
+            self.differs = false;
+        } else if seen.direction == self.backwards {
+            self.differs = false;
+        } else if self.differs {
             lost = true;
             self.backwards = seen.direction;
+            self.differs = false;
+        } else {
+            self.differs = true;
         }
         self.add(seen.raw);
         (self.count, lost)

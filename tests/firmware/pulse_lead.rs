@@ -305,6 +305,15 @@ fn an_input_that_is_bad_keeps_the_axes_off_and_the_alarm_on() {
         !rig.outputs.enabled && rig.alarm(),
         "nothing is enabled unasked"
     );
+    // What a host enables is not the control's, before its line was off.
+    rig.tick(Some(Command::Enable));
+    rig.run(100);
+    assert!(rig.outputs.enabled && rig.alarm());
+    assert_eq!(rig.mode(), MotionMode::Hold);
+    rig.switch(false);
+    rig.switch(true);
+    assert!(rig.outputs.enabled && !rig.alarm());
+    assert_eq!(rig.mode(), MotionMode::Plan);
 }
 
 #[test]

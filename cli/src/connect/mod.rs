@@ -112,6 +112,11 @@ impl MachineOptions {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(Command::Flash(flash)) = &arguments.command {
+        anyhow::ensure!(
+            arguments.machine.is_nowhere(),
+            "flash: it programs a board through its debug probe, not a machine behind an option; leave --port, --tcp, --look, --simulated \
+             and --emulated out"
+        );
         return flash::run(flash);
     }
     if let Some(Command::Log(log)) = &arguments.command

@@ -6,11 +6,54 @@ use tempfile::TempDir;
 
 use crate::command;
 
-/// A folder with a file that is no image.
+/// A folder with an ELF file without a section (System V ABI, chapter 4), and one that is none.
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("own.elf"), "an image").unwrap();
+    // 32 bits, the least byte first; an executable file for Arm with a header of 52 bytes.
+    let mut elf = b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0\x02\0\x28\0\x01\0\0\0".to_vec();
+    elf.extend([0; 16]);
+    elf.extend(
+        [52_u16, 32, 0, 40, 0, 0]
+            .map(u16::to_le_bytes)
+            .as_flattened(),
+    );
+    fs::write(folder.path().join("own.elf"), elf).unwrap();
+    fs::write(folder.path().join("text.elf"), "an image").unwrap();
     folder
+}
+
+#[test]
+fn what_is_no_image_is_refused_for_what_it_is() {
+    let folder = folder();
+    for (file, reason) in [
+        ("none.elf", "no such file"),
+        (".", "folder"),
+        ("text.elf", "no ELF file"),
+    ] {
+        let words = ["connect", "flash", file, "--chip", "STM32F446RETx"];
+        let said = command::fail(folder.path(), &words);
+        assert!(said.contains(reason), "{file}: {said}");
+    }
+}
+
+#[test]
+fn a_machine_behind_an_option_is_not_flashed() {
+    let folder = folder();
+    for machine in ["--simulated", "--port=/dev/ttyACM0"] {
+        let words = [
+            "connect",
+            machine,
+            "flash",
+            "own.elf",
+            "--chip",
+            "STM32F446RETx",
+        ];
+        let said = command::fail(folder.path(), &words);
+        assert!(
+            said.contains("--simulated") && said.contains("probe"),
+            "{said}"
+        );
+    }
 }
 
 #[test]

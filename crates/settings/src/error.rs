@@ -62,6 +62,13 @@ pub enum Reason {
     },
     /// It works only with a PD, PID or N-PID.
     NeedsPid,
+    /// A serial encoder has none.
+    SerialHasNone,
+    /// It makes a spring stiffer than the control rate resolves.
+    TooShortForRate {
+        /// Least value.
+        least: f64,
+    },
 }
 
 /// A refused value: which field of which axis, what it holds, and why that cannot be.
@@ -105,6 +112,14 @@ impl fmt::Display for SettingsError {
         match self.reason {
             Reason::Missing => f.write_str(" is missing, which the chosen law or kind of feedforward needs: `quadrant commission` fills it in"),
             Reason::NeedsPid => f.write_str(" needs feedback/law = \"pd\", \"pid\" or \"n-pid\"; choose one, or leave it out"),
+            Reason::SerialHasNone => f.write_str(
+                ": a serial encoder has no index; set it to null, and home by encoder/offset_mm or without the index",
+            ),
+            Reason::TooShortForRate { least } => write!(
+                f,
+                ": below {} friction's springs are stiffer than the control rate resolves; raise it",
+                Decimal(least)
+            ),
             Reason::NeedsSerial => f.write_str(
                 ": only a serial encoder shows its position from the start; give encoder/serial, or leave this out",
             ),
@@ -129,7 +144,7 @@ impl fmt::Display for SettingsError {
                  (`quadrant commission`)",
             ),
             Reason::NotRising => f.write_str(" must lie above the point before it"),
-            Reason::NotFinite => f.write_str(" is not a finite number"),
+            Reason::NotFinite => f.write_str(" is not a finite number; give one within the limits of docs/settings.md"),
             Reason::OutOfRange { least, most } => {
                 write!(f, " is outside {} to {}", Decimal(least), Decimal(most))
             }

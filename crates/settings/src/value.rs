@@ -60,6 +60,10 @@ macro_rules! plain {
             }
 
             fn from_json(json: &[u8]) -> Option<Self> {
+                // Nothing is no value, which a float would take for one that is not a number.
+                if json == b"null" {
+                    return None;
+                }
                 Some(serde_json_core::from_slice(json).ok()?.0)
             }
         }

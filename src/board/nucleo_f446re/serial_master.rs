@@ -136,6 +136,9 @@ impl SerialMaster {
     /// Arms the streams, which rest, for a frame.
     #[inline(always)]
     pub(crate) fn arm(&mut self) {
+        // A request that a late start left must not start this frame before its time.
+        // SAFETY: no more requests until the timer's next end.
+        self.spi.cr2().write(|w| unsafe { w.bits(0) });
         // A byte that came too late must not be taken for the next one's; reading both also clears an overrun.
         let _ = self.spi.dr8().read();
         let _ = self.spi.sr().read();

@@ -34,22 +34,27 @@ struct Job<'a> {
 
 impl<'a> Job<'a> {
     fn new(elf: &'a Path, chip: Option<&str>, probe: Option<&'a str>) -> anyhow::Result<Self> {
-        if !elf.is_file() {
+        let shown = elf.display();
+        if !elf.exists() {
             bail!(
-                "{}: no such file; a release has images, and docs/board-nucleo-f446re.md says how one is built",
-                elf.display()
+                "{shown}: no such file; a release has images, and docs/board-nucleo-f446re.md says how one is built"
             );
         }
-        let image = fs::read(elf).with_context(|| format!("cannot read {}", elf.display()))?;
-        let chip = chip_for(named_chip(&image).as_deref(), chip)
-            .with_context(|| elf.display().to_string())?;
+        if !elf.is_file() {
+            bail!("{shown}: it is a folder or a device; give the firmware's ELF file");
+        }
+        let image = fs::read(elf).with_context(|| format!("cannot read {shown}"))?;
+        let file = object::File::parse(&*image).with_context(|| {
+            format!("{shown}: it is no ELF file, or not the whole of one; give the firmware's")
+        })?;
+        let chip =
+            chip_for(named_chip(&file).as_deref(), chip).with_context(|| shown.to_string())?;
         Ok(Self { elf, chip, probe })
     }
 }
 
-/// Returns the chip that an image names; `None` if it names none, or is no image.
-fn named_chip(image: &[u8]) -> Option<String> {
-    let file = object::File::parse(image).ok()?;
+/// Returns the chip that an image names; `None` if it names none.
+fn named_chip(file: &object::File<'_>) -> Option<String> {
     let section = file.section_by_name(".probe-rs.chip")?;
     String::from_utf8(section.data().ok()?.to_vec()).ok()
 }
@@ -156,9 +161,12 @@ mod tests {
 
     #[test]
     fn the_chip_is_read_from_its_section() {
-        let image = elf(".probe-rs.chip", b"STM32F446RETx");
-        assert_eq!(named_chip(&image).as_deref(), Some("STM32F446RETx"));
-        assert_eq!(named_chip(&elf(".text", b"STM32F446RETx")), None);
+        let chip = |section| {
+            let image = elf(section, b"STM32F446RETx");
+            named_chip(&object::File::parse(&*image).unwrap())
+        };
+        assert_eq!(chip(".probe-rs.chip").as_deref(), Some("STM32F446RETx"));
+        assert_eq!(chip(".probe-rs.text"), None);
     }
 
     #[test]
@@ -169,6 +177,5 @@ mod tests {
         );
         let asked = chip_for(None, None).unwrap_err().to_string();
         assert!(asked.contains("--chip STM32F446RETx"), "{asked}");
-        assert_eq!(named_chip(b"no image"), None);
     }
 }

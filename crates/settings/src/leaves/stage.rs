@@ -19,13 +19,16 @@ fn most_index_tolerance(axis: &AxisSettings, _: f64) -> f64 {
         .map_or(f64::INFINITY, |counts| f64::from(counts / 4))
 }
 
-/// A frame and the encoder's rest fit into a control period at half of this clock, which the board may take.
+/// A frame and the encoder's rest fit into a control period at half of this clock, which the board may take, down to its slowest.
 fn least_clock_hz(axis: &AxisSettings, period_s: f64) -> f64 {
     let encoder = &axis.encoder;
     let serial = encoder.serial.unwrap_or_default();
     let bits = 8 * serial.frame_bytes(encoder.counter_bits);
-    2.0 * bits as f64 / (FRAME_SHARE * period_s)
+    (2.0 * bits as f64 / (FRAME_SHARE * period_s)).max(SLOWEST_SPI_HZ)
 }
+
+/// Slowest clock that every board has, Hz: an SPI's of 48 MHz through its largest divider.
+const SLOWEST_SPI_HZ: f64 = 187_500.0;
 
 /// Share of the control period in which a frame is shifted.
 const FRAME_SHARE: f64 = 0.7;
@@ -96,7 +99,7 @@ pub(super) const ENCODER: &[LeafInfo] = &exchanged(Exchange::Restart, [
     name("encoder.serial.protocol", SerialProtocol::VARIANTS,
         "Protocol of a serial encoder in the place of A, B and index; left out with its part, there is none."),
     number("encoder.serial.clock_hz", "Hz",
-        times(1.0, "what shifts a frame twice in 70 % of the control period", least_clock_hz), at(1e7), 3e6,
+        times(1.0, "what shifts a frame twice in 70 % of the control period, and 187 500", least_clock_hz), at(1e7), 3e6,
         "Largest clock of the serial encoder and its cable; the board takes the next below that it has."),
     flag("encoder.serial.gray",
         "True if the position of SSI comes in Gray code."),

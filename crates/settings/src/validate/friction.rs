@@ -147,8 +147,18 @@ impl AxisSettings {
         let Some(plant) = &self.plant else {
             return Ok(());
         };
-        let most = self.feedforward.range * plant.stiffest_v_per_mm(period_s);
+        let (range, stiffest) = (self.feedforward.range, plant.stiffest_v_per_mm(period_s));
+        let most = range * stiffest;
         if stiffness_v_per_mm > most {
+            // Over its own range it would be resolved.
+            if range < 1.0 && stiffness_v_per_mm <= stiffest {
+                let least = stiffness_v_per_mm / stiffest;
+                return at.refuse(
+                    "feedforward.range",
+                    range,
+                    Reason::TooShortForRate { least },
+                );
+            }
             return at.refuse(field, stiffness_v_per_mm, Reason::TooStiffForRate { most });
         }
         Ok(())

@@ -124,7 +124,16 @@ impl AxisSettings {
         self.validate_homing(at)?;
         self.validate_feedback(at, period_s)?;
         self.validate_friction(at, period_s, elements)?;
+        self.validate_serial(at)?;
         self.validate_offset(at)
+    }
+
+    fn validate_serial(&self, at: Place) -> Result<(), SettingsError> {
+        if let (Some(_), Some(counts)) = (&self.encoder.serial, self.encoder.counts_per_index) {
+            let reason = Reason::SerialHasNone;
+            return at.refuse("encoder.counts_per_index", counts.into(), reason);
+        }
+        Ok(())
     }
 
     /// A position from the start is that of a serial encoder, of no other homing, and of one place in the travel alone.

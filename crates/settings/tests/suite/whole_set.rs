@@ -64,6 +64,28 @@ fn every_number_out_of_its_range_is_refused_by_name_on_every_axis() {
 }
 
 #[test]
+fn a_serial_encoder_has_no_index() {
+    let error = refusal(&with_x(|axis| {
+        axis.encoder.serial = Some(SerialSettings::default())
+    }));
+    check_message(&error, AxisName::X, "encoder.counts_per_index");
+    assert_eq!(error.reason, Reason::SerialHasNone);
+}
+
+#[test]
+fn a_range_that_makes_a_spring_too_stiff_is_refused_by_its_own_name_with_its_least_value() {
+    let error = refusal(&with_x(|axis| axis.feedforward.range = 0.05));
+    check_message(&error, AxisName::X, "feedforward.range");
+    let Reason::TooShortForRate { least } = error.reason else {
+        panic!("{error}");
+    };
+    let mut settings = with_x(|axis| axis.feedforward.range = least * 1.001);
+    settings.validate(10).unwrap();
+    settings.axes[0].feedforward.range = least * 0.999;
+    assert!(settings.validate(10).is_err());
+}
+
+#[test]
 fn every_number_that_is_not_finite_is_refused_by_name() {
     for &(field, ..) in FIELDS {
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
@@ -149,6 +171,7 @@ fn a_position_from_the_start_is_that_of_a_serial_encoder_alone_and_of_one_place_
     let with = |change: fn(&mut AxisSettings)| {
         with_x(|axis| {
             axis.homing = None;
+            axis.encoder.counts_per_index = None;
             axis.encoder.counter_bits = 20;
             axis.encoder.serial = Some(SerialSettings::default());
             axis.encoder.offset_mm = Some(12.5);
@@ -173,7 +196,10 @@ fn a_position_from_the_start_is_that_of_a_serial_encoder_alone_and_of_one_place_
             "give encoder/serial",
         ),
         (
-            |axis| axis.homing = StageSettings::simulated().axes[0].homing,
+            |axis| {
+                axis.homing = StageSettings::simulated().axes[0].homing.clone();
+                axis.homing.as_mut().expect("by default").index = false;
+            },
             "encoder.offset_mm",
             "leave this or homing out",
         ),
