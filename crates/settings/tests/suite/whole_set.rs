@@ -197,7 +197,7 @@ fn a_position_from_the_start_is_that_of_a_serial_encoder_alone_and_of_one_place_
         ),
         (
             |axis| {
-                axis.homing = StageSettings::simulated().axes[0].homing.clone();
+                axis.homing = StageSettings::simulated().axes[0].homing;
                 axis.homing.as_mut().expect("by default").index = false;
             },
             "encoder.offset_mm",
