@@ -6,9 +6,8 @@ use tempfile::TempDir;
 
 use crate::command;
 
-/// A folder with an ELF file without a section (System V ABI, chapter 4), and one that is none.
-fn folder() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
+/// An ELF file without a section (System V ABI, chapter 4).
+pub(crate) fn empty_elf() -> Vec<u8> {
     // 32 bits, the least byte first; an executable file for Arm with a header of 52 bytes.
     let mut elf = b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0\x02\0\x28\0\x01\0\0\0".to_vec();
     elf.extend([0; 16]);
@@ -17,7 +16,13 @@ fn folder() -> TempDir {
             .map(u16::to_le_bytes)
             .as_flattened(),
     );
-    fs::write(folder.path().join("own.elf"), elf).unwrap();
+    elf
+}
+
+/// A folder with such a file, and with one that is none.
+fn folder() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("own.elf"), empty_elf()).unwrap();
     fs::write(folder.path().join("text.elf"), "an image").unwrap();
     folder
 }
