@@ -222,7 +222,7 @@ fn reference(status: &Status) -> f64 {
     status.axes[0].position_mm + f64::from(status.axes[0].error_mm)
 }
 
-/// Where the encoder's lines show x, mm.
+/// Position that the encoder's lines show of x, mm.
 fn shown(bench: &mut Bench) -> f64 {
     bench.with(|world, _, _| world.shown[0]) as f64 * COUNT_MM
 }

@@ -54,7 +54,7 @@ pub(super) fn run(client: &mut Client, command: &IdentifyCommand) -> anyhow::Res
 /// Result of a measurement.
 struct Found {
     table: Table,
-    /// What else there is to say of it.
+    /// Lines beneath the table: the plant, what the model explains.
     lines: Vec<String>,
 }
 

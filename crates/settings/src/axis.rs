@@ -98,12 +98,12 @@ fn continuous_v() -> f64 {
     AmplifierSettings::default().continuous_v
 }
 
-fn whole_range() -> f64 {
-    FeedforwardSettings::default().range
-}
-
 fn overload_s() -> f64 {
     AmplifierSettings::default().overload_s
+}
+
+fn whole_range() -> f64 {
+    FeedforwardSettings::default().range
 }
 
 /// The feedforward.

@@ -379,7 +379,7 @@ impl<'a, 'b> Trials<'a, 'b> {
     }
 
     /// Adds a law that ran; its index if it is chosen, else the PID's.
-    pub(super) fn add_and_judge(&mut self, law: LawResult) -> Result<usize, VerifyError> {
+    fn add_and_judge(&mut self, law: LawResult) -> Result<usize, VerifyError> {
         let from = self.laws.len();
         self.laws.push(law);
         self.withheld(from)
