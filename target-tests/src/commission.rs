@@ -22,6 +22,7 @@ const FRICTION: StaticFrictionSettings = StaticFrictionSettings {
     velocities_mm_s: (1.0, 20.0),
     count: 6,
     stretch_mm: 5.0,
+    short: None,
     settling_s: 0.3,
     two_sided: false,
     acceleration_mm_s2: 500.0,

@@ -10,7 +10,9 @@ use crate::design::Target;
 use crate::identify::frf::FrfMeasurement;
 use crate::identify::motor_constant::MotorConstant;
 use crate::identify::plant::PlantFit;
-use crate::identify::static_friction::{FrictionFit, FrictionMap, StaticFrictionSettings};
+use crate::identify::static_friction::{
+    FrictionFit, FrictionMap, ShortRuns, StaticFrictionSettings,
+};
 use crate::identify::virgin_curve::{GmsFit, VirginCurveError};
 use crate::record::Recording;
 
@@ -40,10 +42,23 @@ impl Default for CommissionSettings {
             nonlinear_peak: 2.5,
             trials: true,
             friction: StaticFrictionSettings {
-                velocities_mm_s: (0.1, 40.0),
-                ..StaticFrictionSettings::default()
+                short: Some(SHORT_RUNS),
+                ..whole_runs()
             },
         }
+    }
+}
+
+/// Slow runs that take a third of the time.
+const SHORT_RUNS: ShortRuns = ShortRuns {
+    below_mm_s: 0.5,
+    stretch_mm: 2.5,
+};
+
+fn whole_runs() -> StaticFrictionSettings {
+    StaticFrictionSettings {
+        velocities_mm_s: (0.1, 40.0),
+        ..StaticFrictionSettings::default()
     }
 }
 
@@ -58,6 +73,7 @@ impl CommissionSettings {
             }),
             nonlinear_peak: f64::INFINITY,
             trials: false,
+            friction: whole_runs(),
             ..Self::default()
         }
     }

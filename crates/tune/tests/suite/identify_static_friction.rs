@@ -4,7 +4,7 @@ use quadrant_law::friction::PerDirection;
 use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_tune::commission::bootstrap::measuring_settings;
 use quadrant_tune::identify::static_friction::{
-    Exponent, FrictionFitError, FrictionMap, FrictionRun, StaticFrictionError,
+    Exponent, FrictionFitError, FrictionMap, FrictionRun, ShortRuns, StaticFrictionError,
     StaticFrictionSettings, fit_map, measure,
 };
 use quadrant_tune::test_axis::{SimulatedTestAxis, TestAxis};
@@ -22,6 +22,17 @@ fn runs() -> StaticFrictionSettings {
     StaticFrictionSettings {
         velocities_mm_s: (0.1, 40.0),
         ..StaticFrictionSettings::default()
+    }
+}
+
+/// The same with short slow runs.
+fn short_runs() -> StaticFrictionSettings {
+    StaticFrictionSettings {
+        short: Some(ShortRuns {
+            below_mm_s: 0.5,
+            stretch_mm: 2.5,
+        }),
+        ..runs()
     }
 }
 
@@ -60,8 +71,14 @@ fn leaning(factor: f64) -> AxisParameters {
 
 #[test]
 fn every_axis_shows_its_friction_in_both_directions() {
-    for (index, truth) in StageParameters::real().axes.iter().enumerate() {
-        let map = mapped(&mut test_axis(index, truth, 1), &runs());
+    let axes = StageParameters::real().axes;
+    for (index, settings) in [0, 1, 2]
+        .map(|index| (index, runs()))
+        .into_iter()
+        .chain([(0, short_runs()), (2, short_runs())])
+    {
+        let truth = &axes[index];
+        let map = mapped(&mut test_axis(index, truth, 1), &settings);
         let found = fit_map(&map, Exponent::Fixed(1.0)).unwrap();
         let offset_v = truth.imperfections.offset_v;
         for (model, exact, pushed_v) in [
@@ -135,6 +152,26 @@ fn stick_slip_at_the_low_end_is_detected_and_does_not_count() {
     let stuck = map.runs.iter().filter(|run| run.stick_slip).count();
     assert_eq!(found.stick_slip_runs, stuck);
     assert!(found.directions.positive.speeds_mm_s.0 > 0.04);
+}
+
+#[test]
+fn short_runs_are_freed_of_the_screws_ripple_and_take_less_than_half_the_time() {
+    let mut truth = leaning(1.0);
+    truth.imperfections.ripple_v = 0.03;
+    let mut levels_v = Vec::new();
+    let mut lasts_s = Vec::new();
+    for settings in [runs(), short_runs()] {
+        let mut axis = test_axis(0, &truth, 4);
+        let (map, recordings) = measure(&mut axis, &settings, &mut |_| {}).unwrap();
+        let slow = map.runs.iter().filter(|run| run.velocity_mm_s.abs() < 0.5);
+        levels_v.push(slow.map(|run| run.voltage_v).collect::<Vec<_>>());
+        lasts_s.push(recordings.iter().map(|run| run.duration_s()).sum::<f64>());
+    }
+    assert_eq!(levels_v[0].len(), 10);
+    for (whole_v, short_v) in levels_v[0].iter().zip(&levels_v[1]) {
+        assert!((whole_v - short_v).abs() < 0.002, "{levels_v:?}");
+    }
+    assert!(lasts_s[1] < 0.5 * lasts_s[0], "{lasts_s:?}");
 }
 
 #[test]

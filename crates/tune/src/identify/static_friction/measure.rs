@@ -18,6 +18,8 @@ pub struct StaticFrictionSettings {
     pub count: usize,
     /// Length over which the voltage is averaged, mm: a whole number of turns of the screw, whose ripple then cancels.
     pub stretch_mm: f64,
+    /// Runs over less than that; none where all go over it.
+    pub short: Option<ShortRuns>,
     /// Time after which a run's beginning is over, s: the slowest mode of the loop has died away.
     pub settling_s: f64,
     /// Runs go through both sides of the travel: the axis stands at its negative end.
@@ -26,12 +28,23 @@ pub struct StaticFrictionSettings {
     pub acceleration_mm_s2: f64,
 }
 
+/// Slow runs over a part of the stretch, which would take the longest over all of it: the screw's ripple there, over its mean, is that of the
+/// slowest run over the whole stretch that moved evenly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShortRuns {
+    /// Velocity below which a run is short, mm/s.
+    pub below_mm_s: f64,
+    /// Length over which its voltage is averaged, in the middle of the stretch, mm.
+    pub stretch_mm: f64,
+}
+
 impl Default for StaticFrictionSettings {
     fn default() -> Self {
         Self {
             velocities_mm_s: (0.05, 40.0),
             count: 16,
             stretch_mm: 10.0,
+            short: None,
             settling_s: 2.5,
             two_sided: false,
             acceleration_mm_s2: 500.0,
@@ -165,6 +178,12 @@ impl StaticFrictionSettings {
                 "it must be above zero, in mm",
             ),
             (
+                "stretch of short runs",
+                self.averaged_mm(0.0),
+                self.averaged_mm(0.0) > 0.0,
+                "it must be above zero, in mm",
+            ),
+            (
                 "settling time",
                 self.settling_s,
                 self.settling_s >= 0.0,
@@ -191,9 +210,19 @@ impl StaticFrictionSettings {
         (0..self.count).map(move |index| slowest * (fastest / slowest).powf(index as f64 / last))
     }
 
+    /// Length over which the voltage of a run is averaged, mm.
+    fn averaged_mm(&self, velocity_mm_s: f64) -> f64 {
+        let short = self
+            .short
+            .filter(|short| velocity_mm_s < short.below_mm_s)
+            .map_or(f64::INFINITY, |short| short.stretch_mm);
+        self.stretch_mm.min(short)
+    }
+
     /// The length of a run, mm: up to speed, settling, the stretch, and down again.
     fn length_mm(&self, velocity_mm_s: f64) -> f64 {
-        self.stretch_mm + velocity_mm_s * (self.settling_s + 2.0 * self.ramp_s(velocity_mm_s))
+        self.averaged_mm(velocity_mm_s)
+            + velocity_mm_s * (self.settling_s + 2.0 * self.ramp_s(velocity_mm_s))
     }
 }
 
@@ -221,12 +250,13 @@ pub fn measure(
     }
     let all_s = settings.lasts_s();
     let mut done_s = 0.0;
-    let mut map = FrictionMap::default();
+    let mut velocities_mm_s = Vec::new();
     let mut recordings: Vec<Recording> = Vec::new();
     let start_mm = settings.start_mm(test_axis.info().travel_mm);
     for velocity_mm_s in settings.velocities() {
         let length_mm = settings.length_mm(velocity_mm_s);
-        for (direction, from_mm) in [(1.0, start_mm), (-1.0, start_mm + length_mm)] {
+        let begin_mm = start_mm + 0.5 * (settings.stretch_mm - settings.averaged_mm(velocity_mm_s));
+        for (direction, from_mm) in [(1.0, begin_mm), (-1.0, begin_mm + length_mm)] {
             approach_from(test_axis, recordings.last(), from_mm)?;
             let run_s = length_mm / velocity_mm_s;
             let recording = test_axis.perform(
@@ -245,32 +275,90 @@ pub fn measure(
                 &mut |share| progress((done_s + share * run_s) / all_s),
             )?;
             done_s += run_s;
-            map.runs.extend(evaluate(
-                &recording,
-                settings,
-                direction * velocity_mm_s,
-                test_axis.info().resolution_mm,
-            ));
+            velocities_mm_s.push(direction * velocity_mm_s);
             recordings.push(recording);
         }
     }
-    map.runs
-        .sort_by(|a, b| a.velocity_mm_s.total_cmp(&b.velocity_mm_s));
-    map.mark_shaken();
-    Ok((map, recordings))
+    let resolution_mm = test_axis.info().resolution_mm;
+    Ok((
+        settings.map(&velocities_mm_s, &recordings, resolution_mm),
+        recordings,
+    ))
 }
 
-/// Evaluates a run at a velocity over the stretch, the last before it slows down.
+impl StaticFrictionSettings {
+    /// The map of recorded runs at velocities, the slowest first.
+    fn map(
+        &self,
+        velocities_mm_s: &[f64],
+        recordings: &[Recording],
+        resolution_mm: f64,
+    ) -> FrictionMap {
+        let mut map = FrictionMap::default();
+        for sign in [1.0, -1.0] {
+            let mut ripple = None;
+            // The fastest first: the last one over the whole stretch is the one to which the short ones are held.
+            for (&velocity_mm_s, recording) in velocities_mm_s.iter().zip(recordings).rev() {
+                if sign * velocity_mm_s < 0.0 {
+                    continue;
+                }
+                let is_short = self.averaged_mm(velocity_mm_s.abs()) < self.stretch_mm;
+                let held_to = ripple.as_ref().filter(|_| is_short);
+                let Some(run) = evaluate(recording, self, velocity_mm_s, resolution_mm, held_to)
+                else {
+                    continue;
+                };
+                if !is_short && !run.stick_slip {
+                    ripple = Some(Ripple { recording, run });
+                }
+                map.runs.push(run);
+            }
+        }
+        map.runs
+            .sort_by(|a, b| a.velocity_mm_s.total_cmp(&b.velocity_mm_s));
+        map.mark_shaken();
+        map
+    }
+}
+
+/// The screw's ripple, as a run over the whole stretch shows it.
+pub(super) struct Ripple<'a> {
+    recording: &'a Recording,
+    run: FrictionRun,
+}
+
+impl Ripple<'_> {
+    /// Mean voltage between two positions over that of the run, V; none where the run was not there.
+    fn between_v(&self, one_mm: f64, other_mm: f64) -> Option<f64> {
+        let between = one_mm.min(other_mm)..one_mm.max(other_mm);
+        let recording = self.recording;
+        let there: Vec<f64> = recording
+            .reference_mm
+            .iter()
+            .zip(&recording.voltage_v)
+            .filter(|(reference, _)| between.contains(*reference))
+            .map(|(_, voltage)| *voltage)
+            .collect();
+        (!there.is_empty()).then(|| mean(&there) - self.run.voltage_v)
+    }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Evaluates a run at a velocity over its stretch, the last before it slows down, without the screw's ripple if that is known.
 pub(super) fn evaluate(
     recording: &Recording,
     settings: &StaticFrictionSettings,
     velocity_mm_s: f64,
     resolution_mm: f64,
+    ripple: Option<&Ripple<'_>>,
 ) -> Option<FrictionRun> {
     let direction = velocity_mm_s.signum();
     let ramp_s = settings.ramp_s(velocity_mm_s.abs());
     let end_mm = recording.reference_mm.last()? - 0.5 * velocity_mm_s * ramp_s;
-    let begin_mm = end_mm - direction * settings.stretch_mm;
+    let begin_mm = end_mm - direction * settings.averaged_mm(velocity_mm_s.abs());
     let passed = |limit_mm: f64| {
         recording
             .reference_mm
@@ -285,16 +373,22 @@ pub(super) fn evaluate(
     if voltages.len() < 2 * PARTS {
         return None;
     }
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let count = positions.len() as f64 - 1.0;
     let measured =
         (positions[positions.len() - 1] - positions[0]) / (count * recording.sample_time_s);
-    let voltage_v = mean(voltages);
-    // Parts opposite each other on the screw have opposite ripple: their mean scatters without it.
+    let length = voltages.len() / PARTS;
+    let references = &recording.reference_mm[stretch];
     let parts: Vec<f64> = voltages
-        .chunks_exact(voltages.len() / PARTS)
-        .map(mean)
+        .chunks_exact(length)
+        .zip(references.chunks_exact(length))
+        .map(|(voltages, references)| {
+            let rippled = ripple.and_then(|it| it.between_v(references[0], references[length - 1]));
+            mean(voltages) - rippled.unwrap_or(0.0)
+        })
         .collect();
+    let rippled = ripple.and_then(|it| it.between_v(begin_mm, end_mm));
+    let voltage_v = mean(voltages) - rippled.unwrap_or(0.0);
+    // Parts opposite each other on the screw have opposite ripple: their mean scatters without it.
     let pairs: Vec<f64> = (0..PARTS / 2)
         .map(|index| 0.5 * (parts[index] + parts[index + PARTS / 2]))
         .collect();

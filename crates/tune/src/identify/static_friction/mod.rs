@@ -14,4 +14,4 @@ mod measure;
 
 pub use fit::{DirectionFit, Exponent, FrictionFit, FrictionFitError, fit_map};
 pub use map::{FrictionMap, FrictionRun};
-pub use measure::{StaticFrictionError, StaticFrictionSettings, measure};
+pub use measure::{ShortRuns, StaticFrictionError, StaticFrictionSettings, measure};
