@@ -26,10 +26,14 @@ impl Trials<'_, '_> {
             return Ok(chosen);
         };
         let was_refused = self.refused.iter().any(|refused| refused.law == fixed.law);
-        let is_refused = self.refuses_when_small(&mut found);
+        let is_refused = if was_refused {
+            self.exceeds_when_small(&mut found, &fixed)?
+        } else {
+            self.refuses_when_small(&mut found)
+        };
         let [(fixed_worst, fixed_mean), (worst, mean)] =
             [&fixed, &found].map(|law| self.against_pid(law));
-        let is_worse = is_refused && !was_refused
+        let is_worse = is_refused
             || found.stopped.is_some()
             || worst > fixed_worst.max(MAX_SCATTER_RATIO)
             || mean > MOST_LOST * fixed_mean;

@@ -63,9 +63,9 @@ const fn small(amplitude_mm: f64, velocity_mm_s: f64, scored_cycles: usize) -> S
 }
 
 /// Small slow sines, on which no law may be worse than the PID. What throws a table behind a spring depends on the frequency: the short
-/// sines are at 3 to 10 Hz, and many of their cycles count, for an axis that sticks does not do the same in each. The last ones are slow, or
+/// sines are at 3 to 12 Hz, and many of their cycles count, for an axis that sticks does not do the same in each. The last ones are slow, or
 /// longer at a moderate speed: they show an axis that meets less friction at such a speed than is fed forward.
-pub(super) const SMALL_SINES: [SmallSine; 14] = [
+pub(super) const SMALL_SINES: [SmallSine; 17] = [
     small(0.02, 0.6, 9),
     small(0.02, 0.9, 9),
     small(0.02, 1.2, 9),
@@ -73,10 +73,13 @@ pub(super) const SMALL_SINES: [SmallSine; 14] = [
     small(0.03, 1.4, 9),
     small(0.05, 1.0, 9),
     small(0.05, 1.4, 9),
+    small(0.02, 1.55, 9),
+    small(0.08, 1.45, 9),
+    small(0.15, 1.55, 5),
     small(0.02, 0.35, 9),
     small(0.1, 0.35, 3),
     small(0.18, 0.2, 1),
-    small(0.4, 0.7, 2),
+    small(0.7, 0.85, 2),
     small(0.6, 0.45, 1),
     small(0.8, 1.1, 2),
     small(0.9, 0.2, 1),

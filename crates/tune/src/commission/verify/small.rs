@@ -55,11 +55,18 @@ pub(super) enum Remedy {
 }
 
 /// Remedies in the order in which they are tried: the first that is not worse than the PID on any sine is chosen.
-pub(super) const REMEDIES: [Remedy; 3] = [
+pub(super) const REMEDIES: [Remedy; 4] = [
     Remedy::From(0.4),
+    Remedy::From(0.8),
     Remedy::From(FROM_MM_S),
     Remedy::LinearFrom(FROM_MM_S),
 ];
+
+/// Largest error over the PID's on a usual sine of a remedy that is chosen where none is worse nowhere: that of an axis that sticks scatters
+/// by more than [`MAX_SCATTER_RATIO`].
+const MAX_REMEDY_RATIO: f64 = 1.1;
+/// Largest error over the PID's on a small sine of a law that no remedy mends, up to which it is chosen for what it gains on others.
+const FAR_RATIO: f64 = 1.5;
 
 /// Longest stroke up to which no friction is fed forward, over that of the sine on which it was worse.
 const STROKE_ROOM: f64 = 1.1;
@@ -96,9 +103,9 @@ impl Remedy {
 }
 
 impl Trials<'_, '_> {
-    /// The chosen law's index where it is not worse than the PID on small slow sines, else that of one with less friction. Where all of
-    /// those are worse, too, the chosen one stays, among those that were refused; but for one that was stopped there, or that feeds
-    /// nothing forward: the PID's, then. Laws that ran on the usual sines are added.
+    /// The chosen law's index where it is not worse than the PID on small slow sines, else that of one with less friction, or of that which
+    /// is least worse on the usual sines. Where there is none, the chosen one stays, among those that were refused; but for one that was
+    /// stopped there, that feeds nothing forward, or that is far worse: the PID's, then. Laws that ran on the usual sines are added.
     pub(super) fn keep_small(&mut self, chosen: usize) -> Result<usize, VerifyError> {
         if chosen == 0 {
             return Ok(0);
@@ -120,14 +127,63 @@ impl Trials<'_, '_> {
             }
             law = beyond;
         }
+        let mut least = (MAX_REMEDY_RATIO, None);
         for remedy in REMEDIES {
-            let found = self.try_remedy(remedy, &law)?;
-            if found != 0 {
-                return Ok(found);
+            if let Some((found, worst)) = self.try_remedy(remedy, &law)? {
+                if worst <= MAX_SCATTER_RATIO {
+                    return Ok(found);
+                }
+                if worst < least.0 {
+                    least = (worst, Some(found));
+                }
             }
         }
-        let stopped = self.laws[chosen].stopped.is_some();
-        Ok(if stopped { 0 } else { chosen })
+        if let Some(found) = least.1 {
+            return Ok(found);
+        }
+        Ok(if self.is_far_worse_when_small(chosen)? {
+            0
+        } else {
+            chosen
+        })
+    }
+
+    /// True if a law's largest error on any small sine exceeds the PID's by far, or it is stopped.
+    fn is_far_worse_when_small(&mut self, index: usize) -> Result<bool, VerifyError> {
+        let law = &mut self.laws[index];
+        if law.stopped.is_some() {
+            return Ok(true);
+        }
+        let (settings, sines) = (law.settings.clone(), self.bench.small_sines);
+        let scores = self.bench.run_small(law, &settings, sines, |_, _| false)?;
+        let is_far = |(own, pid): (&Score, &Score)| {
+            own.largest_mm > FAR_RATIO * pid.largest_mm
+                && is_worse(own, pid, settings.encoder.resolution_mm)
+        };
+        Ok(law.stopped.is_some() || scores.iter().zip(&self.pid_when_small).any(is_far))
+    }
+
+    /// True if a law's largest error on any small sine exceeds both the PID's and that of another one by more than chance, or it is stopped.
+    pub(super) fn exceeds_when_small(
+        &mut self,
+        law: &mut LawResult,
+        other: &LawResult,
+    ) -> Result<bool, VerifyError> {
+        let (sines, count_mm) = (self.bench.small_sines, law.settings.encoder.resolution_mm);
+        let mut other = other.clone();
+        let mut run = |law: &mut LawResult| {
+            let settings = law.settings.clone();
+            self.bench.run_small(law, &settings, sines, |_, _| false)
+        };
+        let (others, own) = (run(&mut other)?, run(law)?);
+        let exceeds = own.iter().enumerate().any(|(index, own)| {
+            let mut bounds = [&self.pid_when_small, &others].into_iter();
+            bounds.all(|bound| {
+                let bound = bound.get(index);
+                bound.is_none_or(|bound| is_worse(own, bound, count_mm))
+            })
+        });
+        Ok(law.stopped.is_some() || exceeds)
     }
 
     /// A law that feeds friction forward beyond the stroke on which it was refused, where that is a short one, and the usual sines are so much
@@ -147,13 +203,18 @@ impl Trials<'_, '_> {
         })
     }
 
-    /// Runs a changed law; its index if it is chosen, else the PID's.
-    fn try_remedy(&mut self, remedy: Remedy, law: &LawResult) -> Result<usize, VerifyError> {
+    /// Runs a changed law: its index, and the largest of its errors over the PID's on the usual sines; none if it is worse than the PID
+    /// when small, or gains too little on the mean.
+    fn try_remedy(
+        &mut self,
+        remedy: Remedy,
+        law: &LawResult,
+    ) -> Result<Option<(usize, f64)>, VerifyError> {
         let Some((name, settings)) = remedy.of(law, &self.pid) else {
-            return Ok(0);
+            return Ok(None);
         };
         let Ok((mut found, _)) = self.bench.try_law(&name, &settings, 0) else {
-            return Ok(0);
+            return Ok(None);
         };
         let from_mm_s = settings.feedforward.from_mm_s;
         let is_linear = settings.feedback == self.pid.feedback;
@@ -166,7 +227,7 @@ impl Trials<'_, '_> {
             .all(|small| is_pid(&small.sine));
         let refused = self.refuses_when_small(&mut found);
         if found.stopped.is_some() || refused && !same {
-            return Ok(0);
+            return Ok(None);
         }
         // The whole of it was judged on these sines before, and part of it need not keep clear of the PID by as much.
         let all = self.bench.sines.len();
@@ -179,11 +240,7 @@ impl Trials<'_, '_> {
             .against(&self.laws[0].only(&differing), &self.drift);
         let (_, mean) = self.against_pid(&found);
         self.laws.push(found);
-        Ok(if worst <= MAX_SCATTER_RATIO && mean <= MAX_ERROR_RATIO {
-            self.laws.len() - 1
-        } else {
-            0
-        })
+        Ok((mean <= MAX_ERROR_RATIO).then_some((self.laws.len() - 1, worst)))
     }
 
     /// Runs a law on the small sines; true if it is worse than the PID on one, at which it ends, or is stopped. One that is worse on none

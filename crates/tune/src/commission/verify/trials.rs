@@ -60,8 +60,8 @@ pub(super) const MOST_RUNS: usize = {
     let confirmed = (1 + MAX_CANDIDATES) * withheld;
     let instead = kinds * (SINES.len() - COMPARISON_SINES) + shares * SINES.len();
     let all_small = SMALL_SINES.len() + MARGIN_SINES;
-    let small = (2 + REMEDIES.len()) * all_small + REMEDIES.len() * SINES.len();
-    let learning = SINES.len() + all_small;
+    let small = (3 + REMEDIES.len()) * all_small + REMEDIES.len() * SINES.len();
+    let learning = SINES.len() + 2 * all_small;
     alone + compared + refined + scaled + confirmed + instead + small + learning
 };
 
