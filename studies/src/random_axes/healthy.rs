@@ -4,7 +4,7 @@ use quadrant_law::reference::{MotionSettings, PointToPointSettings};
 use quadrant_settings::AxisSettings;
 use quadrant_sim::plant::AxisParameters;
 use quadrant_tune::test_axis::{
-    Drive, Experiment, SimulatedTestAxis, TestAxis, approach, usable_mm,
+    Drive, Experiment, ExperimentError, SimulatedTestAxis, TestAxis, approach, usable_mm,
 };
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -29,10 +29,12 @@ const FRICTION: [f64; 3] = [1.0, 0.7, 1.4];
 const MOVES: usize = 12;
 /// Share of the acceleration that the output limit allows beyond friction: the rest is the loop's.
 const MOST_EFFORT: f64 = 0.6;
+/// Share of the velocity limit: beyond the limit itself the experiment is stopped, and an axis overshoots.
+const MOST_VELOCITY: f64 = 0.95;
 /// Duration and pause of a knock, s.
 const KNOCK_S: (f64, f64) = (4e-3, 1.5);
-/// Voltage of a knock over friction.
-const KNOCK_RATIO: f64 = 2.0;
+/// Voltages of a knock over friction: the next one where the axis may not be as fast as one makes it.
+const KNOCK_RATIOS: [f64; 3] = [2.0, 1.5, 1.2];
 /// Parts of a tenth of a second at its end that are looked at.
 const PARTS: usize = 5;
 /// Noise of the encoder over the deviation that it may make in the loop.
@@ -55,7 +57,7 @@ impl Health {
             let applied = axis.apply(settings).map_err(|error| error.to_string());
             applied.map(|()| axis)
         };
-        match axis(1.0).and_then(|axis| hum(axis, parameters)) {
+        match axis(1.0).and_then(|axis| hum(&axis, parameters)) {
             Ok(hum) => health.hum = Some(hum),
             Err(fault) => health.note(fault),
         }
@@ -106,7 +108,8 @@ fn to_and_fro(
     );
     let usable = 0.8 * usable_mm(axis.info().travel_mm);
     let distance_mm = usable * random.random::<f64>().mul_add(0.9, 0.1);
-    let max_velocity_mm_s = limits.max_velocity_mm_s * random.random_range(0.2..1.0);
+    let max_velocity_mm_s =
+        MOST_VELOCITY * limits.max_velocity_mm_s * random.random_range(0.2..1.0);
     let spare_v = output_v
         - 1.4 * friction_v(parameters)
         - max_velocity_mm_s * parameters.damping_per_s / parameters.gain_mm_per_v_s2;
@@ -142,14 +145,30 @@ fn to_and_fro(
 }
 
 /// Largest RMS deviation in tenths of a second, over what a count and the noise explain.
-fn hum(mut axis: SimulatedTestAxis, parameters: &AxisParameters) -> Result<f64, String> {
+fn hum(axis: &SimulatedTestAxis, parameters: &AxisParameters) -> Result<f64, String> {
+    for ratio in KNOCK_RATIOS {
+        let knock_v = ratio * friction_v(parameters);
+        match knocked(axis.clone(), parameters, knock_v) {
+            Err(error) if error.ran_off() => {}
+            outcome => return outcome.map_err(|error| error.to_string()),
+        }
+    }
+    Err("every knock makes it too fast".to_owned())
+}
+
+/// The same after knocks of a voltage.
+fn knocked(
+    mut axis: SimulatedTestAxis,
+    parameters: &AxisParameters,
+    knock_v: f64,
+) -> Result<f64, ExperimentError> {
     let info = axis.info();
     let samples = |seconds: f64| (seconds * info.rate_hz) as usize;
     let noise_mm = NOISE_RATIO * parameters.imperfections.encoder_noise_mm;
     let still_mm = info.resolution_mm.hypot(noise_mm);
     let mut most = 0.0_f64;
     for sign in [1.0, -1.0] {
-        let mut injection_v = vec![sign * KNOCK_RATIO * friction_v(parameters); samples(KNOCK_S.0)];
+        let mut injection_v = vec![sign * knock_v; samples(KNOCK_S.0)];
         injection_v.resize(samples(KNOCK_S.0 + KNOCK_S.1), 0.0);
         let held = Experiment {
             name: "knock".to_owned(),
@@ -158,9 +177,7 @@ fn hum(mut axis: SimulatedTestAxis, parameters: &AxisParameters) -> Result<f64, 
             decimation: 1,
             time_limit_s: 10.0,
         };
-        let recording = axis
-            .perform(&held, &mut |_| {})
-            .map_err(|error| error.to_string())?;
+        let recording = axis.perform(&held, &mut |_| {})?;
         let tenth = samples(0.1);
         let begin = recording.len().saturating_sub(PARTS * tenth);
         for part in recording.position_mm[begin..].chunks_exact(tenth) {

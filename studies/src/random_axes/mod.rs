@@ -358,11 +358,14 @@ fn over_a_link(subject: &Subject, base: &AxisSettings) -> Result<Tested, Machine
     let mut truth = StageParameters::real();
     truth.axes[0] = subject.parameters.clone();
     let connection = |error: ClientError| MachineError::Connection(Box::new(error));
-    let setup = StageSetup {
+    let mut setup = StageSetup {
         settings,
         truth,
         ..StageSetup::simulated()
     };
+    let beyond_mm = 2.0 * subject.travel.half_mm();
+    setup.marks[0].negative_limit_mm = -beyond_mm;
+    setup.marks[0].positive_limit_mm = beyond_mm;
     let link = SimulatedLink::start(&setup, subject.seed, None)
         .map_err(|error| MachineError::Connection(Box::new(error)))?;
     let mut client = Client::open(link).map_err(connection)?;
