@@ -201,7 +201,7 @@ impl LevelSearch {
         };
         self.returns = ended_farther_out(stopped, self.travel_mm);
         self.ahead = inwards(stopped, 0.0, self.ahead);
-        if self.returns {
+        if self.returns && !crossed(stopped) {
             self.raise_ahead();
         }
         let mut driven = stopped.voltage_v.iter().rev();
@@ -220,11 +220,14 @@ impl LevelSearch {
         resolution_mm: f64,
     ) -> Result<bool, MotorConstantError> {
         let limit_mm = MAX_START_SHARE * self.travel_mm;
+        let driven = self.ahead;
         self.ahead = inwards(recording, limit_mm, self.ahead);
         let returned = self.returns;
         self.returns = ended_farther_out(recording, self.travel_mm);
         if returned {
-            if self.returns {
+            if self.returns && crossed(recording) {
+                self.levels[usize::from(driven < 0.0)].lower();
+            } else if self.returns {
                 self.raise_ahead();
             }
             return Ok(false);
@@ -299,6 +302,12 @@ fn ended_farther_out(recording: &Recording, travel_mm: f64) -> bool {
     last_mm.abs() > MAX_START_SHARE * travel_mm && inwards_mm < MIN_RETURN_SHARE * travel_mm
 }
 
+/// True if an axis ended on the other side of the middle: too much brought it there, not too little.
+fn crossed(recording: &Recording) -> bool {
+    let ends = (recording.position_mm.first(), recording.position_mm.last());
+    matches!(ends, (Some(first_mm), Some(last_mm)) if first_mm * last_mm < 0.0)
+}
+
 /// The voltage of all passes, V; the first goes `ahead`, 1 or -1.
 fn steps(
     settings: &MotorConstantSettings,
@@ -336,4 +345,50 @@ fn steps(
                 .chain(std::iter::repeat_n(0.0, rest))
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An axis that is driven inwards from one side, and ends at a position, mm.
+    fn driven_back(end_mm: f64) -> Recording {
+        let position_mm = vec![-5.0, 0.5 * (end_mm - 5.0), end_mm];
+        Recording {
+            sample_time_s: 1e-4,
+            reference_mm: position_mm.clone(),
+            position_mm,
+            voltage_v: vec![0.2; 3],
+            ..Recording::default()
+        }
+    }
+
+    #[test]
+    fn an_axis_that_flies_past_the_middle_is_given_less_and_one_that_goes_nowhere_more() {
+        let axis = AxisInfo {
+            name: "x",
+            rate_hz: 10_000.0,
+            resolution_mm: 5e-4,
+            full_scale_v: 10.0,
+            travel_mm: 6.5,
+            start_mm: 0.0,
+            max_velocity_mm_s: 50.0,
+            max_acceleration_mm_s2: 500.0,
+        };
+        let before_v = 0.2;
+        let reduced = |end_mm: f64| {
+            let mut search = LevelSearch::new(MotorConstantSettings::default(), &axis);
+            search.levels = [Level::at(before_v); 2];
+            search.returns = true;
+            search.reduce(Some(&driven_back(end_mm)));
+            search.levels.map(|level| level.volts)
+        };
+        let [positive_v, negative_v] = reduced(6.6);
+        assert!(
+            positive_v < before_v && negative_v <= before_v,
+            "{positive_v} {negative_v}"
+        );
+        let [positive_v, _] = reduced(-6.6);
+        assert!(positive_v > before_v, "{positive_v}");
+    }
 }
