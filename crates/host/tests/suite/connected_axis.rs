@@ -17,8 +17,10 @@ use quadrant_link::message::{
 };
 use quadrant_sim::plant::StageParameters;
 use quadrant_sim::stage_setup::StageSetup;
+use quadrant_tune::commission::CrossCheck;
 use quadrant_tune::commission::bootstrap::{measuring_settings, zero_gain_settings};
 use quadrant_tune::identify::motor_constant::{self, MotorConstantSettings};
+use quadrant_tune::identify::revise::ExplicitFriction;
 use quadrant_tune::test_axis::{
     Drive, Experiment, ExperimentError, SimulatedTestAxis, TestAxis, Travel,
 };
@@ -394,4 +396,24 @@ fn the_motor_constant_of_the_connected_axis_is_that_of_the_axis_itself() {
         connected.gain_mm_per_v_s2, direct.gain_mm_per_v_s2
     );
     assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+}
+
+#[test]
+fn the_cross_checks_of_an_axis_of_50_mm_s_are_made_within_its_limits() {
+    let mut setup = StageSetup::commissioned();
+    let axis = &mut setup.settings.axes[0];
+    axis.limits.max_velocity_mm_s = 50.0;
+    // The best PID.
+    axis.feedback.pid.kp_v_per_mm = 1.3293;
+    axis.feedback.pid.ki_v_per_mm_s = 146.34;
+    axis.feedback.pid.kd_v_s_per_mm = 0.005_511;
+    let settings = axis.clone();
+    let mut client = Client::open(SimulatedLink::start(&setup, 1, None).unwrap()).unwrap();
+    let travel = Travel::either_way(200.0);
+    let mut axis = ConnectedAxis::new(&mut client, AxisName::X, travel).unwrap();
+    let checked = CrossCheck::run(&mut axis, &settings, 7, &mut |_, _| {}).unwrap();
+    let mut revisions = checked.revisions.iter();
+    let revised = revisions.find(|revision| revision.friction == ExplicitFriction::Both);
+    let ratio = revised.unwrap().plant.gain_mm_per_v_s2 / settings.plant.unwrap().gain_mm_per_v_s2;
+    assert!((0.9..1.1).contains(&ratio), "A {ratio} times the settings'");
 }

@@ -28,13 +28,14 @@ pub struct CrossCheck {
 }
 
 /// Lowest frequencies of the excitation, Hz, each with its RMS over the friction at breakaway: one after the other, until the axis stays
-/// within its bounds of way and velocity. With the first it slides most of the time.
-const EXCITATIONS: [(f64, f64); 5] = [
+/// within its bounds of way and velocity, and the linear model is found. With the first it slides most of the time.
+const EXCITATIONS: [(f64, f64); 6] = [
     (4.0, 2.6),
     (10.0, 2.6),
     (25.0, 2.0),
     (60.0, 1.5),
     (25.0, 1.1),
+    (60.0, 0.9),
 ];
 /// Highest frequency of the excitation, Hz.
 const HIGHEST_HZ: f64 = 400.0;
@@ -85,17 +86,16 @@ impl CrossCheck {
             let too_far = [FaultCode::InjectionBounds, FaultCode::EncoderJump];
             error.strayed() || error.fault().is_some_and(|fault| too_far.contains(&fault))
         };
-        let [first, others @ ..] = EXCITATIONS;
-        let mut at_rest = measure(first);
-        for gentler in others {
-            match &at_rest {
-                Err(ReviseError::Experiment(error)) if strayed(error) => {
-                    at_rest = measure(gentler);
-                }
+        let mut found = Err(ReviseError::NoResponse);
+        for tried in EXCITATIONS {
+            found = measure(tried).and_then(|at_rest| Ok((at_rest.revise(&plant)?, at_rest)));
+            match &found {
+                Err(ReviseError::Experiment(error)) if strayed(error) => {}
+                Err(ReviseError::Fit(_)) => {}
                 _ => break,
             }
         }
-        let at_rest = at_rest?;
+        let (revisions, at_rest) = found?;
 
         approach(test_axis, 0.0)?;
         let moved = shuttle(test_axis, 1, &mut |share| {
@@ -107,8 +107,6 @@ impl CrossCheck {
         };
         let motion = fit_motion(&moved, &motion, &|_| {})?;
 
-        progress("revising the linear model", 0.0);
-        let revisions = at_rest.revise(&plant)?;
         Ok(Self {
             at_rest: at_rest.response()?,
             revisions,

@@ -203,7 +203,7 @@ pub fn simulated_response(
 }
 
 /// Revises A, B and C for each kind of explicit friction, in parallel; Td stays. `original` was fitted to the measured
-/// response; `friction` was identified.
+/// response; `friction` was identified. A kind with which the search does not converge is left out, unless it does with none.
 ///
 /// # Errors
 /// A measurement without a usable response, a candidate that cannot be run as the axis was, or a search that fails.
@@ -222,9 +222,14 @@ pub fn revise(
             least_coherence: measurement.least_coherence,
         });
     }
-    ExplicitFriction::ALL
+    let revised: Vec<Result<Revision, ReviseError>> = ExplicitFriction::ALL
         .into_par_iter()
         .map(|kind| revise_for(kind, measurement, &measured, &lines, original, friction))
+        .collect();
+    let converges = revised.iter().any(Result::is_ok);
+    revised
+        .into_iter()
+        .filter(|revision| !(converges && matches!(revision, Err(ReviseError::Fit(_)))))
         .collect()
 }
 
