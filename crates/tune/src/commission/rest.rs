@@ -20,8 +20,8 @@ const PART_S: f64 = 0.1;
 const KNOCK_S: f64 = 5e-3;
 /// Voltage of a knock over friction.
 const KNOCK_RATIO: f64 = 3.0;
-/// Shares of a knock's duration and of its voltage beyond friction, until one is not stopped: a light axis on a short travel may not be as
-/// fast as the whole makes it.
+/// Shares of a knock's duration and of its voltage beyond friction, until one does not throw the axis beyond its limits: a light one on a
+/// short travel may not be as fast as the whole makes it.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
 /// Largest RMS deviation of an axis that is at rest, counts, beside the encoder's noise.
 const STILL_COUNTS: f64 = 1.0;
@@ -88,12 +88,13 @@ impl Knock {
         test_axis.apply(&settings)?;
         let mut knocked =
             |share: f64| approach(test_axis, HOME_MM).and_then(|()| self.knocked(test_axis, share));
-        let mut outcome = knocked(SHARES[0]);
-        for share in &SHARES[1..] {
-            if outcome.is_ok() {
-                break;
+        let [whole, gentler @ ..] = SHARES;
+        let mut outcome = knocked(whole);
+        for share in gentler {
+            match &outcome {
+                Err(error) if error.strayed() => outcome = knocked(share),
+                _ => break,
             }
-            outcome = knocked(*share);
         }
         Ok(outcome)
     }
