@@ -65,8 +65,9 @@ pub(super) const REMEDIES: [Remedy; 4] = [
 /// Largest error over the PID's on a usual sine of a remedy that is chosen where none is worse nowhere: that of an axis that sticks scatters
 /// by more than [`MAX_SCATTER_RATIO`].
 const MAX_REMEDY_RATIO: f64 = 1.1;
-/// Largest error over the PID's on a small sine of a law that no remedy mends, up to which it is chosen for what it gains on others.
-const FAR_RATIO: f64 = 1.5;
+/// Largest error over the PID's on a small sine of a law that no remedy mends, up to which it is chosen for what it gains on others; and the
+/// excess in counts, beyond which it is not.
+const FAR: (f64, f64) = (1.5, 5.0);
 
 /// Longest stroke up to which no friction is fed forward, over that of the sine on which it was worse.
 const STROKE_ROOM: f64 = 1.1;
@@ -157,8 +158,9 @@ impl Trials<'_, '_> {
         let (settings, sines) = (law.settings.clone(), self.bench.small_sines);
         let scores = self.bench.run_small(law, &settings, sines, |_, _| false)?;
         let is_far = |(own, pid): (&Score, &Score)| {
-            own.largest_mm > FAR_RATIO * pid.largest_mm
-                && is_worse(own, pid, settings.encoder.resolution_mm)
+            let excess_mm = own.largest_mm - pid.largest_mm;
+            own.largest_mm > FAR.0 * pid.largest_mm
+                && excess_mm > FAR.1 * settings.encoder.resolution_mm
         };
         Ok(law.stopped.is_some() || scores.iter().zip(&self.pid_when_small).any(is_far))
     }

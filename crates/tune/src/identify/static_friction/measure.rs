@@ -104,6 +104,8 @@ impl StaticFrictionSettings {
         let room_mm = self.room_mm(axis.travel_mm);
         if self.stretch_mm > STRETCH_SHARE * room_mm {
             self.stretch_mm = STRETCH_SHARE * room_mm;
+            // Part of a short stretch shows too little.
+            self.short = None;
             self.settling_s = self.settling_s.min(SHORT_SETTLING_S);
         }
         let (slowest, fastest) = self.velocities_mm_s;
