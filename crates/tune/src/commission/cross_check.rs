@@ -72,7 +72,7 @@ impl CrossCheck {
         let mut measure = |tried| {
             test_axis.apply(&measuring_settings(settings))?;
             approach(test_axis, 0.0)?;
-            AtRest::measure(
+            let at_rest = AtRest::measure(
                 test_axis,
                 settings,
                 excitation(tried),
@@ -80,7 +80,9 @@ impl CrossCheck {
                 &mut |share| {
                     progress("response at rest", share);
                 },
-            )
+            )?;
+            progress("revising the linear model", 0.0);
+            Ok((at_rest.revise(&plant)?, at_rest))
         };
         let strayed = |error: &ExperimentError| {
             let too_far = [FaultCode::InjectionBounds, FaultCode::EncoderJump];
@@ -88,7 +90,7 @@ impl CrossCheck {
         };
         let mut found = Err(ReviseError::NoResponse);
         for tried in EXCITATIONS {
-            found = measure(tried).and_then(|at_rest| Ok((at_rest.revise(&plant)?, at_rest)));
+            found = measure(tried);
             match &found {
                 Err(ReviseError::Experiment(error)) if strayed(error) => {}
                 Err(ReviseError::Fit(_)) => {}

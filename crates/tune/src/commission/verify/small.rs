@@ -62,12 +62,13 @@ pub(super) const REMEDIES: [Remedy; 4] = [
     Remedy::LinearFrom(FROM_MM_S),
 ];
 
-/// Largest error over the PID's on a usual sine of a remedy that is chosen where none is worse nowhere: that of an axis that sticks scatters
-/// by more than [`MAX_SCATTER_RATIO`].
+/// Largest error over the PID's on a usual sine up to which a remedy is chosen where there is no better one: that of an axis that sticks
+/// scatters by more than [`MAX_SCATTER_RATIO`].
 const MAX_REMEDY_RATIO: f64 = 1.1;
-/// Largest error over the PID's on a small sine of a law that no remedy mends, up to which it is chosen for what it gains on others; and the
-/// excess in counts, beyond which it is not.
-const FAR: (f64, f64) = (1.5, 5.0);
+/// Error over the PID's on a small sine from which on a law that no remedy mends is not chosen, whatever it gains on others.
+const FAR_RATIO: f64 = 1.5;
+/// Least excess of such an error over the PID's, counts.
+const FAR_COUNTS: f64 = 5.0;
 
 /// Longest stroke up to which no friction is fed forward, over that of the sine on which it was worse.
 const STROKE_ROOM: f64 = 1.1;
@@ -128,41 +129,42 @@ impl Trials<'_, '_> {
             }
             law = beyond;
         }
-        let mut least = (MAX_REMEDY_RATIO, None);
+        let mut worse = Vec::new();
         for remedy in REMEDIES {
-            if let Some((found, worst)) = self.try_remedy(remedy, &law)? {
-                if worst <= MAX_SCATTER_RATIO {
-                    return Ok(found);
-                }
-                if worst < least.0 {
-                    least = (worst, Some(found));
-                }
+            match self.try_remedy(remedy, &law)? {
+                Some((found, worst)) if worst <= MAX_SCATTER_RATIO => return Ok(found),
+                Some((found, worst)) if worst < MAX_REMEDY_RATIO => worse.push((found, worst)),
+                _ => {}
             }
         }
-        if let Some(found) = least.1 {
+        if let Some((found, _)) = worse.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
             return Ok(found);
         }
-        Ok(if self.is_far_worse_when_small(chosen)? {
-            0
-        } else {
-            chosen
-        })
+        let is_far_worse = self.is_far_worse_when_small(chosen)?;
+        Ok(if is_far_worse { 0 } else { chosen })
     }
 
     /// True if a law's largest error on any small sine exceeds the PID's by far, or it is stopped.
     fn is_far_worse_when_small(&mut self, index: usize) -> Result<bool, VerifyError> {
-        let law = &mut self.laws[index];
+        let mut law = self.laws[index].clone();
         if law.stopped.is_some() {
             return Ok(true);
         }
-        let (settings, sines) = (law.settings.clone(), self.bench.small_sines);
-        let scores = self.bench.run_small(law, &settings, sines, |_, _| false)?;
+        let scores = self.scores_when_small(&mut law)?;
+        let least_mm = FAR_COUNTS * law.settings.encoder.resolution_mm;
         let is_far = |(own, pid): (&Score, &Score)| {
-            let excess_mm = own.largest_mm - pid.largest_mm;
-            own.largest_mm > FAR.0 * pid.largest_mm
-                && excess_mm > FAR.1 * settings.encoder.resolution_mm
+            own.largest_mm > FAR_RATIO * pid.largest_mm
+                && own.largest_mm - pid.largest_mm > least_mm
         };
-        Ok(law.stopped.is_some() || scores.iter().zip(&self.pid_when_small).any(is_far))
+        let is_far = scores.iter().zip(&self.pid_when_small).any(is_far);
+        self.laws[index] = law;
+        Ok(self.laws[index].stopped.is_some() || is_far)
+    }
+
+    /// Runs a law on all small sines, unless it is stopped: its scores.
+    fn scores_when_small(&mut self, law: &mut LawResult) -> Result<Vec<Score>, VerifyError> {
+        let (settings, sines) = (law.settings.clone(), self.bench.small_sines);
+        self.bench.run_small(law, &settings, sines, |_, _| false)
     }
 
     /// True if a law's largest error on any small sine exceeds both the PID's and that of another one by more than chance, or it is stopped.
@@ -171,17 +173,12 @@ impl Trials<'_, '_> {
         law: &mut LawResult,
         other: &LawResult,
     ) -> Result<bool, VerifyError> {
-        let (sines, count_mm) = (self.bench.small_sines, law.settings.encoder.resolution_mm);
-        let mut other = other.clone();
-        let mut run = |law: &mut LawResult| {
-            let settings = law.settings.clone();
-            self.bench.run_small(law, &settings, sines, |_, _| false)
-        };
-        let (others, own) = (run(&mut other)?, run(law)?);
+        let others = self.scores_when_small(&mut other.clone())?;
+        let own = self.scores_when_small(law)?;
+        let count_mm = law.settings.encoder.resolution_mm;
         let exceeds = own.iter().enumerate().any(|(index, own)| {
-            let mut bounds = [&self.pid_when_small, &others].into_iter();
-            bounds.all(|bound| {
-                let bound = bound.get(index);
+            [&self.pid_when_small, &others].into_iter().all(|bounds| {
+                let bound = bounds.get(index);
                 bound.is_none_or(|bound| is_worse(own, bound, count_mm))
             })
         });

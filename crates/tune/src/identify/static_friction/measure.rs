@@ -324,7 +324,7 @@ impl StaticFrictionSettings {
 }
 
 /// The screw's ripple, as a run over the whole stretch shows it.
-pub(super) struct Ripple<'a> {
+struct Ripple<'a> {
     recording: &'a Recording,
     run: FrictionRun,
 }
@@ -350,7 +350,7 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 /// Evaluates a run at a velocity over its stretch, the last before it slows down, without the screw's ripple if that is known.
-pub(super) fn evaluate(
+fn evaluate(
     recording: &Recording,
     settings: &StaticFrictionSettings,
     velocity_mm_s: f64,
