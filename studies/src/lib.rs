@@ -6,7 +6,7 @@
 //!   [`wrong_model`] (feedforward whose model is wrong);
 //! - campaigns, a result from each of many seeds: [`random_axes`] (commissioning), [`random_faults`] (what must hold in every
 //!   case) and [`cuts`] (learning under random cuts);
-//! - [`study`] and [`campaign`]: the frames of both kinds; [`competitor`]: the feedforwards that they compare.
+//! - [`study`] and [`campaign`]: the frames of both kinds; [`competitor`]: the feedforwards that they compare; [`true_friction`]: other friction than the stage's.
 #![forbid(unsafe_code)]
 #![allow(missing_docs)]
 
@@ -23,5 +23,6 @@ pub mod robustness;
 pub mod step_direction;
 pub mod study;
 pub mod thesis;
+pub mod true_friction;
 pub mod wrong_model;
 mod x_alone;

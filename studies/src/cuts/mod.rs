@@ -30,6 +30,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::campaign::{Campaign, Lines, make_folder};
 use crate::competitor::Feedforward;
+use crate::true_friction::TrueFriction;
 use crate::x_alone::law_of;
 
 /// `quadrant-studies cuts`.
@@ -38,6 +39,9 @@ pub struct Cuts {
     /// Folder for a trace of each seed: errors, scale, gate and voltages over time, as CSV.
     #[arg(long, value_name = "FOLDER")]
     traces: Option<PathBuf>,
+    /// Model of the axis' true friction; the feedforward is the identified stage's, static and GMS, beside any.
+    #[arg(long, value_enum, default_value_t)]
+    friction: TrueFriction,
 }
 
 impl Campaign for Cuts {
@@ -72,7 +76,7 @@ impl Campaign for Cuts {
     }
 
     fn judge(&self, seed: u64) -> Line {
-        judge(seed, self.traces.as_deref())
+        judge(seed, self.friction, self.traces.as_deref())
     }
 
     fn summarise(lines: &Lines<Line>) -> anyhow::Result<()> {
@@ -166,10 +170,10 @@ fn log_uniform(random: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
 impl Case {
     /// Teeth pass at 20 Hz to 1 kHz, up to 2.5 mm deep; friction x 0.5 to 2, at once or over up to 20 s; mass x 0.8 to 1.25, up
     /// to 0.1 ms more dead time; sines of 3 to 30 mm at 2 to 20 mm/s.
-    fn new(seed: u64) -> Self {
+    fn new(seed: u64, friction: TrueFriction) -> Self {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut truth = StageParameters::real().axes[0]
-            .clone()
+        let mut truth = friction
+            .of(StageParameters::real().axes[0].clone())
             .with_mass(log_uniform(&mut random, 0.8, 1.25))
             .with_more_delay(random.random_range(0.0..1e-4));
         truth.imperfections.encoder_noise_mm = random.random_range(0.05e-3..0.3e-3);
@@ -433,8 +437,8 @@ fn whole_um(run: &Run) -> f64 {
 ///
 /// # Panics
 /// Without the identified stage's settings, which are part of the repository.
-pub fn judge(seed: u64, traces: Option<&Path>) -> Line {
-    let case = Case::new(seed);
+pub fn judge(seed: u64, friction: TrueFriction, traces: Option<&Path>) -> Line {
+    let case = Case::new(seed, friction);
     let stage = identified_settings()
         .expect("the settings of the repository")
         .stage;

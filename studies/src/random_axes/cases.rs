@@ -1,18 +1,13 @@
 //! Named axes unlike the simulated stage's: each with one thing that a commissioning may stumble over.
 
 use quadrant_cli::say;
-use quadrant_law::friction::dahl::DahlParameters;
-use quadrant_law::friction::lugre::LugreParameters;
-use quadrant_sim::plant::{
-    AxisParameters, Backlash, Drive, EncoderSide, FrictionParameters, StageParameters,
-};
+use quadrant_sim::plant::{AxisParameters, Backlash, Drive, EncoderSide, StageParameters};
 use quadrant_tune::test_axis::Travel;
 
 use super::subject::Subject;
 use super::{Line, Outcome, Path, judge_subject};
+use crate::true_friction::TrueFriction;
 
-/// Stiffness of the pre-sliding range of LuGre and Dahl, V/mm: that of the simulated stage's x axis.
-const STIFFNESS_V_PER_MM: f64 = 15.0;
 /// Damping of the resonances.
 const DAMPING: f64 = 0.03;
 /// The motor's share of the mass.
@@ -24,14 +19,6 @@ const TRAVEL_MM: f64 = 200.0;
 
 fn x() -> AxisParameters {
     StageParameters::real().axes[0].clone()
-}
-
-fn lugre(mut axis: AxisParameters) -> AxisParameters {
-    axis.model = FrictionParameters::Lugre(LugreParameters {
-        stiffness_v_per_mm: STIFFNESS_V_PER_MM,
-        damping_v_s_per_mm: 1e-3,
-    });
-    axis
 }
 
 /// Both levels of friction over those of the simulated stage's x axis, in both directions.
@@ -68,12 +55,7 @@ fn case(description: &str, parameters: AxisParameters) -> Subject {
 
 /// The x axis of the simulated stage, changed in one way each.
 pub fn cases() -> Vec<Subject> {
-    let mut dahl = x();
-    dahl.model = FrictionParameters::Dahl(DahlParameters {
-        stiffness_v_per_mm: STIFFNESS_V_PER_MM,
-        exponent: 1.0,
-    });
-    let mut asymmetric = lugre(x()).with_mass(2.0);
+    let mut asymmetric = TrueFriction::Lugre.of(x()).with_mass(2.0);
     asymmetric.friction.positive.curve.coulomb_v *= 1.2;
     asymmetric.friction.positive.curve.breakaway_v *= 1.2;
     let mut varying = x();
@@ -81,8 +63,8 @@ pub fn cases() -> Vec<Subject> {
     varying.imperfections.friction_period_mm = 150.0;
     let mut cases = vec![
         case("half the mass (A x 2)", x().with_mass(0.5)),
-        case("LuGre", lugre(x())),
-        case("Dahl", dahl),
+        case("LuGre", TrueFriction::Lugre.of(x())),
+        case("Dahl", TrueFriction::Dahl.of(x())),
         case("LuGre, 20 % more one way, mass x 2", asymmetric),
     ];
     for frequency_hz in [300.0, 150.0, 30.0] {

@@ -31,12 +31,12 @@ const MOVES: usize = 12;
 const MOST_EFFORT: f64 = 0.6;
 /// Share of the velocity limit: beyond the limit itself the experiment is stopped, and an axis overshoots.
 const MOST_VELOCITY: f64 = 0.95;
-/// Duration and pause of a knock, s.
-const KNOCK_S: (f64, f64) = (4e-3, 1.5);
+/// Rest before a knock, its duration, and the rest after it, s.
+const KNOCK_S: (f64, f64, f64) = (0.2, 4e-3, 3.0);
 /// Voltages of a knock over friction: the next one where the axis may not be as fast as one makes it.
 const KNOCK_RATIOS: [f64; 3] = [2.0, 1.5, 1.2];
 /// Parts of a tenth of a second at its end that are looked at.
-const PARTS: usize = 5;
+const PARTS: usize = 20;
 /// Noise of the encoder over the deviation that it may make in the loop.
 const NOISE_RATIO: f64 = 2.0;
 
@@ -144,7 +144,7 @@ fn to_and_fro(
     Ok(())
 }
 
-/// Largest RMS deviation in tenths of a second, over what a count and the noise explain.
+/// RMS deviation from lines of a tenth of a second, over what a count and the noise explain.
 fn hum(axis: &SimulatedTestAxis, parameters: &AxisParameters) -> Result<f64, String> {
     for ratio in KNOCK_RATIOS {
         let knock_v = ratio * friction_v(parameters);
@@ -168,21 +168,23 @@ fn knocked(
     let still_mm = info.resolution_mm.hypot(noise_mm);
     let mut most = 0.0_f64;
     for sign in [1.0, -1.0] {
-        let mut injection_v = vec![sign * knock_v; samples(KNOCK_S.0)];
-        injection_v.resize(samples(KNOCK_S.0 + KNOCK_S.1), 0.0);
+        let (before_s, knock_s, after_s) = KNOCK_S;
+        let mut loads_v = vec![0.0; samples(before_s)];
+        loads_v.resize(samples(before_s + knock_s), sign * knock_v);
+        axis.load(loads_v);
         let held = Experiment {
             name: "knock".to_owned(),
             drive: Drive::ClosedLoop(MotionSettings::Hold),
-            injection_v,
+            injection_v: vec![0.0; samples(before_s + knock_s + after_s)],
             decimation: 1,
             time_limit_s: 10.0,
         };
         let recording = axis.perform(&held, &mut |_| {})?;
         let tenth = samples(0.1);
         let begin = recording.len().saturating_sub(PARTS * tenth);
-        for part in recording.position_mm[begin..].chunks_exact(tenth) {
-            most = most.max(about_a_line(part) / still_mm);
-        }
+        let parts = recording.position_mm[begin..].chunks_exact(tenth);
+        let squares: f64 = parts.map(|part| about_a_line(part).powi(2)).sum();
+        most = most.max((squares / PARTS as f64).sqrt() / still_mm);
     }
     Ok(most)
 }

@@ -84,4 +84,16 @@ pub(super) fn print(lines: &Lines<Line>) {
             )
         },
     );
+    let few: Vec<u64> = lines
+        .iter()
+        .filter(|(_, line)| !line.small.few_counts.is_empty())
+        .map(|(seed, _)| *seed)
+        .collect();
+    if let [first, ..] = few[..] {
+        say!(
+            "Worse on moves of five counts: {} axes; seed {first}: {}",
+            few.len(),
+            lines[&first].small.few_counts
+        );
+    }
 }

@@ -1,6 +1,7 @@
 //! Learning under random cuts.
 
 use quadrant_studies::cuts::judge;
+use quadrant_studies::true_friction::TrueFriction;
 use rayon::prelude::*;
 
 #[test]
@@ -8,7 +9,7 @@ fn under_random_cuts_learning_is_hardly_ever_worse_than_no_feedforward_and_far_b
 {
     let lines: Vec<_> = (1..=20)
         .into_par_iter()
-        .map(|seed| judge(seed, None))
+        .map(|seed| judge(seed, TrueFriction::Gms, None))
         .collect();
     let mut worse = 0.0;
     let (mut learning_um, mut cancelling_um) = (0.0, 0.0);
@@ -29,7 +30,7 @@ fn under_random_cuts_learning_is_hardly_ever_worse_than_no_feedforward_and_far_b
 fn a_voltage_in_quadrature_to_the_model_shakes_the_axis_no_longer_than_the_guard_allows() {
     // Friction's springs and the mass resonate near the teeth's frequency: the worst windows were x 12 and x 17.
     for seed in [886, 1039] {
-        let line = judge(seed, None);
+        let line = judge(seed, TrueFriction::Gms, None);
         println!("{line:?}");
         assert!(line.cancelling.worst_ratio < 1.5, "{line:?}");
     }

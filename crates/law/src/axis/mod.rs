@@ -383,15 +383,21 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             error: seen.error,
             status,
         };
-        if state.oscillation.is_reduced() {
+        let is_reduced = state.oscillation.is_reduced();
+        if is_reduced {
             self.learning.unsettle(&mut state.learning);
         }
-        let gained = self
-            .learning
-            .step(&mut state.learning, input, |error| match &self.feedback {
-                Feedback::NPid(law) => Some(law.gain.at(error)),
-                _ => None,
-            });
+        let mut gained =
+            self.learning
+                .step(&mut state.learning, input, |error| match &self.feedback {
+                    Feedback::NPid(law) => Some(law.gain.at(error)),
+                    _ => None,
+                });
+        if is_reduced {
+            // The output gained no more than the share of it that is fed forward.
+            let share = self.oscillation.share(&state.oscillation);
+            gained = gained.times(share, Quantity::Multiplier);
+        }
         state.feedback.unload(gained);
         state.rest.unload(gained);
     }

@@ -4,6 +4,7 @@ use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::learning::LearningSettings;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::FaultCode;
 use quadrant_law::safety::oscillation::{
@@ -558,4 +559,38 @@ fn nothing_of_the_friction_is_fed_forward_on_slow_motions_whatever_the_speed_in_
             "{thousandths} thousandths of a count a tick"
         );
     }
+}
+
+/// Errors of an axis that is shaken now and then, on motions too slow for its friction to be fed forward.
+fn shaken_when_slow<S: Scalar>(learning: Option<LearningSettings>) -> Vec<f64> {
+    let settings = x_alone(|x| {
+        x.feedback.law = LawKind::Pid;
+        x.feedforward.kind = FeedforwardKind::Lugre;
+        x.feedforward.from_mm_s = 100.0;
+        x.feedforward.learning = learning;
+    });
+    let [axis, ..] = StageParameters::real().axes;
+    let mut bench = Bench::<S>::new(&settings, axis, &sine_on_x(0.2, 2.0));
+    bench.run(1.2);
+    bench.command(Command::Run);
+    let mut errors = Vec::new();
+    for index in 0..8 {
+        bench.shaken = if index % 2 == 0 {
+            (0.0, 80.0)
+        } else {
+            (0.4, 80.0)
+        };
+        errors.extend((0..2000).map(|_| bench.tick()));
+    }
+    errors
+}
+
+#[test]
+fn learning_takes_nothing_from_the_integral_for_friction_that_is_not_fed_forward() {
+    fn check<S: Scalar>() {
+        let learning = shaken_when_slow::<S>(Some(LearningSettings::DEFAULT));
+        assert_eq!(learning, shaken_when_slow::<S>(None));
+    }
+    check::<f32>();
+    check::<Fixed>();
 }

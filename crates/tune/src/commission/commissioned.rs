@@ -4,8 +4,9 @@ use quadrant_settings::AxisSettings;
 use quadrant_sim::margins::{MarginError, Margins};
 
 use super::guard::Run;
+use super::rest::SLOWEST_HUM_HZ;
 use super::ringing::Ringing;
-use super::verify::{Refused, Verification, WorseSine};
+use super::verify::{Refused, Verification, Worse};
 use crate::design::Target;
 use crate::identify::frf::FrfMeasurement;
 use crate::identify::motor_constant::MotorConstant;
@@ -138,12 +139,22 @@ impl Commissioned {
             notes.push(self.account());
         }
         if let Some(hum) = &self.hums {
-            notes.push(format!(
-                "At rest the axis hums at {:.0} Hz, by {:.1} um, once it is knocked. If that is too much, look for a loose coupling or play, or \
-                 ask for a softer PID with --gain-margin-db 14 --phase-margin-deg 60.",
-                hum.frequency_hz,
-                1e3 * hum.amplitude_mm,
-            ));
+            notes.push(if hum.frequency_hz < SLOWEST_HUM_HZ {
+                format!(
+                    "At rest the axis sticks and slips by {:.1} um, {:.1} times a second, once it is knocked: the integral pushes against \
+                     friction that holds more than it brakes. If that is too much, reduce feedback.pid.ki_v_per_mm_s: it slips less often, or not at \
+                     all, and is less accurate in motion.",
+                    2e3 * hum.amplitude_mm,
+                    2.0 * hum.frequency_hz,
+                )
+            } else {
+                format!(
+                    "At rest the axis hums at {:.0} Hz, by {:.1} um, once it is knocked. If that is too much, look for a loose coupling or \
+                     play, or ask for a softer PID with --gain-margin-db 14 --phase-margin-deg 60.",
+                    hum.frequency_hz,
+                    1e3 * hum.amplitude_mm,
+                )
+            });
         }
         let shown = self.motor.gain_mm_per_v_s2 / self.plant.plant.gain_mm_per_v_s2;
         if !(1.0 / NOTED_MOTOR_RATIO..NOTED_MOTOR_RATIO).contains(&shown) {
@@ -235,8 +246,8 @@ fn refusal(refused: &Refused) -> String {
     let Some(worse) = refused.worse else {
         return format!("{law} was stopped");
     };
-    let WorseSine {
-        sine,
+    let Worse {
+        motion,
         largest_mm,
         pid_mm,
     } = worse;
@@ -249,11 +260,9 @@ fn refusal(refused: &Refused) -> String {
         String::new()
     };
     format!(
-        "{law}{excess} leaves {:.1} um for {:.1} ({:.2} mm at {:.1} mm/s)",
+        "{law}{excess} leaves {:.1} um for {:.1} ({motion})",
         1e3 * largest_mm,
         1e3 * pid_mm,
-        sine.amplitude_mm,
-        sine.velocity_mm_s
     )
 }
 

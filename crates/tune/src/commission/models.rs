@@ -34,6 +34,7 @@ use crate::identify::virgin_curve::{
     self, ASSUMED_ATTRACTION_V_S, GmsFit, Knots, VirginCurveError,
 };
 use crate::record::Recording;
+use crate::test_axis::ExperimentError;
 
 /// Pre-sliding range of a stiff axis, mm: before any is identified.
 const STIFF_RANGE_MM: f64 = 0.001;
@@ -92,6 +93,14 @@ impl Controller {
     pub(super) fn soften(&mut self) {
         self.pid = softer(&self.pid);
         self.circle_bound = 1.0;
+    }
+
+    /// Remarks that it was softened because of what stopped the axis while its friction was measured.
+    pub(super) fn note_stop(&mut self, error: &ExperimentError) {
+        self.remarks.push(format!(
+            "While friction was measured, {error}: {}",
+            softer_remark(1)
+        ));
     }
 
     /// Remarks how often it was softened because of an oscillation while friction held the axis.

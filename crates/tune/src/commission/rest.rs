@@ -11,15 +11,19 @@ use super::ringing::{Ringing, detrended, ringing};
 use crate::test_axis::{Drive, Experiment, ExperimentError, MachineError, TestAxis, approach};
 
 /// Time for which the axis is left alone after a knock, s.
-const LEFT_ALONE_S: f64 = 1.2;
-/// Time at the end of it that counts, s.
-const COUNTED_S: f64 = 0.5;
+const LEFT_ALONE_S: f64 = 3.0;
+/// Time at the end of it that counts, s: one that sticks and slips may take as long from one slip to the next.
+const COUNTED_S: f64 = 2.2;
+/// Lowest frequency of a hum, Hz: what is slower hunts.
+pub(super) const SLOWEST_HUM_HZ: f64 = 20.0;
 /// Length of the lines about which it is looked at, s: a few periods of the slowest hum.
 const PART_S: f64 = 0.1;
 /// Duration of a knock, s.
 const KNOCK_S: f64 = 5e-3;
 /// Voltage of a knock over friction.
 const KNOCK_RATIO: f64 = 3.0;
+/// Parts of a knock's voltage, to either side: one that sticks and slips may come to rest after one of them, and not after another.
+const STRENGTHS: [f64; 4] = [1.0, -1.0, 0.67, -0.67];
 /// Shares of a knock's duration and of its voltage beyond friction, until one does not throw the axis beyond its limits: a light one on a
 /// short travel may not be as fast as the whole makes it.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
@@ -49,7 +53,8 @@ pub(super) struct Knock {
 }
 
 impl Knock {
-    /// The oscillation of an axis at rest under settings, and if it is too much to leave it; none of one that comes to rest, or cannot be tested.
+    /// The oscillation of an axis at rest under settings, and if it is a hum that is too much to leave it: a softer loop hunts more. None of
+    /// one that comes to rest, or cannot be tested.
     ///
     /// # Errors
     /// Settings that the machine refuses.
@@ -60,9 +65,10 @@ impl Knock {
     ) -> Result<Option<(Ringing, bool)>, MachineError> {
         let count_mm = test_axis.info().resolution_mm;
         Ok(match self.test(test_axis, settings)? {
-            Ok(rest) => rest
-                .hum
-                .map(|hum| (hum, rest.rms_mm > LOUD_COUNTS * count_mm)),
+            Ok(rest) => rest.hum.map(|hum| {
+                let is_loud = rest.rms_mm > LOUD_COUNTS * count_mm;
+                (hum, is_loud && hum.frequency_hz >= SLOWEST_HUM_HZ)
+            }),
             // It swung so far that it was stopped.
             Err(_) => test_axis
                 .interrupted()
@@ -108,8 +114,8 @@ impl Knock {
             rms_mm: 0.0,
             hum: None,
         };
-        for sign in [1.0, -1.0] {
-            let mut injection_v = vec![sign * knock_v; knock];
+        for strength in STRENGTHS {
+            let mut injection_v = vec![strength * knock_v; knock];
             injection_v.resize(knock + alone, 0.0);
             let experiment = Experiment {
                 name: "knock at rest".to_owned(),
@@ -125,9 +131,13 @@ impl Knock {
             let noise_mm = NOISE_RATIO * self.noise_mm;
             let still_mm = (STILL_COUNTS * info.resolution_mm).hypot(noise_mm);
             if seen.rms_mm > still_mm && seen.rms_mm > rest.rms_mm {
-                // The encoder's noise hides the turns of a slow one.
                 let swing = recording.slice(begin..recording.len());
-                rest.hum = ringing(&swing).or(Some(seen.ringing()));
+                let found = Some(seen.ringing());
+                rest.hum = if seen.frequency_hz < SLOWEST_HUM_HZ {
+                    found
+                } else {
+                    ringing(&swing).or(found)
+                };
             }
             rest.rms_mm = rest.rms_mm.max(seen.rms_mm);
         }
@@ -135,9 +145,12 @@ impl Knock {
     }
 }
 
-/// Motion about straight lines, one after the other: what creeps is no hum.
+/// Motion at rest.
 struct Swing {
+    /// RMS deviation from straight lines, one after the other: what creeps is no hum.
     rms_mm: f64,
+    /// The same from one line, as one that sticks and slips moves: half of the distance between its ends, and how often it goes to and fro.
+    amplitude_mm: f64,
     frequency_hz: f64,
 }
 
@@ -146,21 +159,32 @@ impl Swing {
         let part = ((PART_S / sample_time_s) as usize).max(8);
         let values: Vec<f64> = position_mm.chunks_exact(part).flat_map(detrended).collect();
         let square: f64 = values.iter().map(|value| value * value).sum();
-        let crossings = values
-            .windows(2)
-            .filter(|pair| (pair[0] < 0.0) != (pair[1] < 0.0))
-            .count();
-        let lasts_s = values.len() as f64 * sample_time_s;
+        let whole = detrended(position_mm);
+        let (low, high) = whole
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                (low.min(*value), high.max(*value))
+            });
+        // The encoder's noise makes no turns.
+        let (lower, upper) = (0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high);
+        let sides = whole.iter().filter_map(|value| {
+            let is_outside = *value < lower || *value > upper;
+            is_outside.then_some(*value > upper)
+        });
+        let sides: Vec<bool> = sides.collect();
+        let turns = sides.windows(2).filter(|pair| pair[0] != pair[1]).count();
+        let lasts_s = whole.len() as f64 * sample_time_s;
         Self {
             rms_mm: (square / values.len().max(1) as f64).sqrt(),
-            frequency_hz: 0.5 * crossings as f64 / lasts_s,
+            amplitude_mm: 0.5 * (high - low),
+            frequency_hz: 0.5 * turns.max(1) as f64 / lasts_s,
         }
     }
 
     fn ringing(&self) -> Ringing {
         Ringing {
             frequency_hz: self.frequency_hz,
-            amplitude_mm: std::f64::consts::SQRT_2 * self.rms_mm,
+            amplitude_mm: self.amplitude_mm,
             share: 1.0,
         }
     }
@@ -206,5 +230,30 @@ mod tests {
             assert!((120.0..220.0).contains(&hum.frequency_hz), "{hum:?}");
             assert!(rest.rms_mm > 4.0 * axis.info().resolution_mm, "{rest:?}");
         }
+    }
+    #[test]
+    fn an_axis_that_sticks_and_slips_at_rest_is_told_from_one_that_hums() {
+        let mut axis = StageParameters::real().axes[0].clone();
+        axis.delay_s = 2.4e-3;
+        for way in [&mut axis.friction.positive, &mut axis.friction.negative] {
+            way.curve.breakaway_v = 2.0 * way.curve.coulomb_v;
+        }
+        let knock = Knock {
+            friction_v: axis.friction.positive.curve.breakaway_v,
+            noise_mm: axis.imperfections.encoder_noise_mm,
+        };
+        let mut axis = SimulatedTestAxis::new(0, axis, 1);
+        let mut settings = measuring_settings(axis.settings());
+        settings.plant = None;
+        settings.feedback.pid.kp_v_per_mm = 0.15;
+        settings.feedback.pid.ki_v_per_mm_s = 4.0;
+        settings.feedback.pid.kd_v_s_per_mm = 1e-3;
+        let rest = knock.test(&mut axis, &settings).unwrap().unwrap();
+        let hunting = rest.hum.unwrap();
+        assert!(hunting.frequency_hz < SLOWEST_HUM_HZ, "{hunting:?}");
+        assert!(hunting.amplitude_mm > 0.05, "{hunting:?}");
+        // A softer loop is no remedy.
+        let seen = knock.ringing(&mut axis, &settings).unwrap();
+        assert!(seen.is_some_and(|(_, is_loud)| !is_loud), "{seen:?}");
     }
 }

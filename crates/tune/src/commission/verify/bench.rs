@@ -1,14 +1,14 @@
 //! The axis that laws run on, one sine after the other.
 
 use quadrant_settings::AxisSettings;
-use quadrant_sim::metrics::Score;
 use quadrant_sim::sine_test::SineTest;
 
 use super::super::bootstrap::measuring_settings;
 use super::super::ringing::{Ringing, lasting};
 use super::VerifyError;
 use super::law_result::LawResult;
-use super::sines::{SCORED_CYCLES, SmallSine, one_lasts_s, run_cycles};
+use super::sines::{USUAL_CYCLES, one_lasts_s, run_cycles};
+use super::small_motions::SmallMotion;
 use crate::record::Recording;
 use crate::test_axis::{ExperimentError, MachineError, TestAxis, approach};
 
@@ -19,7 +19,7 @@ const MIN_DOMINANT_RATIO: f64 = 1.0;
 pub(super) struct Bench<'a> {
     pub(super) test_axis: &'a mut dyn TestAxis,
     pub(super) sines: &'a [SineTest],
-    pub(super) small_sines: &'a [SmallSine],
+    pub(super) small_motions: &'a [SmallMotion],
     pub(super) progress: &'a mut dyn FnMut(f64),
     /// Runs that were made, and that are made at most.
     pub(super) done: usize,
@@ -75,7 +75,11 @@ impl Bench<'_> {
     fn run(&mut self, result: &mut LawResult, count: usize) -> Option<ExperimentError> {
         for index in result.scores.len()..count {
             let sine = self.sines[index];
-            let (score, recording) = match self.run_one(result, sine, SCORED_CYCLES) {
+            let lasts_s = one_lasts_s(&sine, USUAL_CYCLES);
+            let ran = self.run_one(result, lasts_s, |test_axis, law, report| {
+                run_cycles(test_axis, law, sine, USUAL_CYCLES, report)
+            });
+            let (score, recording) = match ran {
                 Ok(ran) => ran?,
                 Err(stopped) => return Some(stopped),
             };
@@ -94,7 +98,7 @@ impl Bench<'_> {
         None
     }
 
-    /// Runs settings under the name of a law on small slow sines, until one is `enough`: their scores. They stay in force.
+    /// Runs settings under the name of a law on small slow motions, until one is `enough`: the largest errors, mm. They stay in force.
     ///
     /// # Errors
     /// A run that is stopped, and settings that are refused.
@@ -102,44 +106,45 @@ impl Bench<'_> {
         &mut self,
         result: &mut LawResult,
         settings: &AxisSettings,
-        sines: &[SmallSine],
-        enough: impl Fn(usize, &Score) -> bool,
-    ) -> Result<Vec<Score>, VerifyError> {
+        motions: &[SmallMotion],
+        enough: impl Fn(usize, f64) -> bool,
+    ) -> Result<Vec<f64>, VerifyError> {
         self.test_axis.apply(settings)?;
-        let mut scores = Vec::new();
-        for (index, small) in sines.iter().enumerate() {
-            let Some((score, _)) = self.run_one(result, small.sine, small.scored_cycles)? else {
+        let mut errors_mm = Vec::new();
+        for (index, motion) in motions.iter().enumerate() {
+            let ran = self.run_one(result, motion.lasts_s(), |test_axis, law, report| {
+                motion.run(test_axis, law, report)
+            });
+            let Some(largest_mm) = ran? else {
                 break;
             };
-            scores.push(score);
-            if enough(index, &score) {
+            errors_mm.push(largest_mm);
+            if enough(index, largest_mm) {
                 break;
             }
         }
-        Ok(scores)
+        Ok(errors_mm)
     }
 
-    /// Runs the law in force on a sine; nothing where a person has ended the trials. The error that stops it is kept.
-    fn run_one(
+    /// Runs the law in force on a motion that lasts a time, s; nothing where a person has ended the trials. The error that stops it is kept.
+    fn run_one<T>(
         &mut self,
         result: &mut LawResult,
-        sine: SineTest,
-        scored_cycles: usize,
-    ) -> Result<Option<(Score, Recording)>, ExperimentError> {
+        lasts_s: f64,
+        run: impl FnOnce(&mut dyn TestAxis, &str, &mut dyn FnMut(f64)) -> Result<T, ExperimentError>,
+    ) -> Result<Option<T>, ExperimentError> {
         if self.interrupted.is_some() {
             return Ok(None);
         }
         let (done, most) = (self.done as f64, self.most_runs as f64);
         let progress = &mut *self.progress;
         let mut report = |share: f64| progress(((done + share) / most).min(1.0));
-        let outcome = approach(self.test_axis, 0.0).and_then(|()| {
-            let law = &result.law;
-            run_cycles(self.test_axis, law, sine, scored_cycles, &mut report)
-        });
+        let outcome = approach(self.test_axis, 0.0)
+            .and_then(|()| run(self.test_axis, &result.law, &mut report));
         self.done += 1;
         match outcome {
             Ok(ran) => {
-                self.used_s += one_lasts_s(&sine, scored_cycles);
+                self.used_s += lasts_s;
                 Ok(Some(ran))
             }
             Err(error @ ExperimentError::Interrupted { .. }) => {

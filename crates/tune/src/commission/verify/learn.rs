@@ -11,37 +11,42 @@ const MOST_LOST: f64 = 1.02;
 
 impl Trials<'_, '_> {
     /// The index of the chosen law with learning, where it is worse than the PID on none of the sines on which the chosen one is not,
-    /// and hardly worse than that one; else the chosen one's.
-    pub(super) fn let_learn(&mut self, chosen: usize) -> Result<usize, VerifyError> {
+    /// and hardly worse than that one.
+    pub(super) fn let_learn(&mut self, chosen: usize) -> Result<Option<usize>, VerifyError> {
         let fixed = self.laws[chosen].clone();
         if !fixed.feeds_forward() {
-            return Ok(chosen);
+            return Ok(None);
+        }
+        let name = format!("{}, learning", fixed.law);
+        let was_refused = |name: &str| self.refused.iter().any(|refused| refused.law == name);
+        let is_fixed_refused = was_refused(&fixed.law);
+        let was_tried = was_refused(&name) || self.laws.iter().any(|law| law.law == name);
+        if was_tried && !is_fixed_refused {
+            return Ok(None);
         }
         let mut settings = fixed.settings.clone();
         settings.feedforward.learning = Some(self.learning);
-        let name = format!("{}, learning", fixed.law);
         // An axis that is too late for it, or whose law has no PID, is refused.
-        let Ok((mut found, _)) = self.bench.try_law(&name, &settings, self.bench.sines.len())
-        else {
-            return Ok(chosen);
+        let Ok((mut found, _)) = self.bench.try_law(&name, &settings, 0) else {
+            return Ok(None);
         };
-        let was_refused = self.refused.iter().any(|refused| refused.law == fixed.law);
-        let is_refused = if was_refused {
+        // What refused the law without it is no fault of the learning.
+        let is_refused = if is_fixed_refused {
             self.exceeds_when_small(&mut found, &fixed)?
         } else {
-            self.refuses_when_small(&mut found)
+            self.refuses_when_small(&mut found)?
         };
+        if is_refused {
+            return Ok(None);
+        }
+        let all = self.bench.sines.len();
+        self.bench.run_on(&mut found, all);
         let [(fixed_worst, fixed_mean), (worst, mean)] =
             [&fixed, &found].map(|law| self.against_pid(law));
-        let is_worse = is_refused
-            || found.stopped.is_some()
+        let is_worse = found.stopped.is_some()
             || worst > fixed_worst.max(MAX_SCATTER_RATIO)
             || mean > MOST_LOST * fixed_mean;
         self.laws.push(found);
-        Ok(if is_worse {
-            chosen
-        } else {
-            self.laws.len() - 1
-        })
+        Ok((!is_worse).then_some(self.laws.len() - 1))
     }
 }

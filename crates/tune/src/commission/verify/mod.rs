@@ -5,8 +5,10 @@
 mod bench;
 mod law_result;
 mod learn;
+mod remedies;
 mod sines;
 mod small;
+mod small_motions;
 mod trials;
 mod variants;
 
@@ -15,9 +17,11 @@ use quadrant_sim::sine_test::SineTest;
 
 use self::bench::Bench;
 pub use self::law_result::LawResult;
-use self::sines::{CHOICE_SINES, COMPARISON_SINES, SCORED_CYCLES, one_lasts_s, small_sines};
-pub use self::sines::{run_cycles, run_sine, sines};
-pub use self::small::{Refused, WorseSine};
+use self::sines::{CHOICE_SINES, COMPARISON_SINES, USUAL_CYCLES, one_lasts_s};
+pub use self::sines::{Cycles, run_cycles, run_sine, sines};
+pub use self::small::{Refused, Worse};
+use self::small_motions::small_motions;
+pub use self::small_motions::{Moves, SmallMotion, run_moves};
 use self::trials::{KINDS, MOST_RUNS, REPEATS, Trials};
 use super::drift::Drift;
 use super::ringing::Ringing;
@@ -31,7 +35,7 @@ pub struct Verification {
     pub laws: Vec<LawResult>,
     /// Index of the chosen law.
     pub chosen: usize,
-    /// The laws that were worse than the PID on a small slow sine, in the order in which they ran: the chosen one among them, if less
+    /// The laws that were worse than the PID on a small slow motion, in the order in which they ran: the chosen one among them, if less
     /// of it was worse, too.
     pub refused: Vec<Refused>,
     /// Change of the axis meanwhile, on the first sine.
@@ -44,7 +48,7 @@ impl Verification {
         self.chosen != 0
     }
 
-    /// True if the chosen law is worse than the PID on a small slow sine: so was less of it.
+    /// True if the chosen law is worse than the PID on a small slow motion: so was less of it.
     pub fn is_worse_when_small(&self) -> bool {
         let chosen = self.is_better_than_pid().then_some(&self.chosen().law);
         self.refused
@@ -112,8 +116,8 @@ impl VerifyError {
 /// errors ask for.
 ///
 /// Chooses the best law that is not worse than the PID, also on sines that were withheld until then. Where there is none, other kinds and
-/// shares take their turn, and then what was tried, without the nonlinear gain. A choice that is worse on small slow sines is replaced by less
-/// of it that is not. The choice then learns, where that is not worse either.
+/// shares take their turn, and then what was tried, without the nonlinear gain. A choice that is worse on small slow motions is replaced by less
+/// of it that is not. The choice learns, where that is not worse either.
 ///
 /// # Errors
 /// A PID whose settings are refused, that is stopped, or that oscillates.
@@ -123,11 +127,11 @@ pub fn verify(
     progress: &mut dyn FnMut(f64),
 ) -> Result<Verification, VerifyError> {
     let info = test_axis.info();
-    let (sines, small_sines) = (sines(&info), small_sines(&info));
+    let (sines, small_motions) = (sines(&info), small_motions(&info));
     let mut bench = Bench {
         test_axis,
         sines: &sines,
-        small_sines: &small_sines,
+        small_motions: &small_motions,
         progress,
         done: 0,
         most_runs: MOST_RUNS,
@@ -150,8 +154,14 @@ fn choose(bench: &mut Bench<'_>, settings: &AxisSettings) -> Result<Verification
     trials.refine_best_kind()?;
     trials.rescale()?;
     let chosen = trials.confirm()?;
-    let chosen = trials.keep_small(chosen)?;
-    let chosen = trials.let_learn(chosen)?;
+    // Where the law may learn at once, it need not be tried without.
+    let chosen = match trials.let_learn(chosen)? {
+        Some(learning) => learning,
+        None => {
+            let kept = trials.keep_small(chosen)?;
+            trials.let_learn(kept)?.unwrap_or(kept)
+        }
+    };
     Ok(trials.ended(chosen))
 }
 
@@ -170,9 +180,9 @@ pub(super) fn lasts_s(info: &AxisInfo) -> f64 {
         4 + compared + REPEATS * usize::from(index == 0)
     };
     let usual = sines(info).into_iter().enumerate();
-    let usual_s = usual.map(|(index, sine)| runs(index) as f64 * one_lasts_s(&sine, SCORED_CYCLES));
-    // The PID alone and the chosen law, which learns at last.
-    let small = small_sines(info).into_iter();
-    let small_s = small.map(|small| 3.0 * one_lasts_s(&small.sine, small.scored_cycles));
+    let usual_s = usual.map(|(index, sine)| runs(index) as f64 * one_lasts_s(&sine, USUAL_CYCLES));
+    // The PID alone, and the chosen law as it learns.
+    let small = small_motions(info).into_iter();
+    let small_s = small.map(|motion| 2.0 * motion.lasts_s());
     usual_s.chain(small_s).sum()
 }

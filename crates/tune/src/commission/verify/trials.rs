@@ -3,14 +3,15 @@
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::learning::LearningSettings;
 use quadrant_settings::AxisSettings;
-use quadrant_sim::metrics::Score;
 
 use super::super::bootstrap::measuring_settings;
 use super::super::drift::Drift;
 use super::bench::Bench;
 use super::law_result::{LawResult, MAX_ERROR_RATIO, MAX_SCATTER_RATIO};
-use super::sines::{CHOICE_SINES, COMPARISON_SINES, MARGIN_SINES, SINES, SMALL_SINES};
-use super::small::{REMEDIES, Refused};
+use super::remedies::{FAST_MM_S, LESS, REMEDIES};
+use super::sines::{CHOICE_SINES, COMPARISON_SINES, SINES};
+use super::small::Refused;
+use super::small_motions::{MARGIN_MOTIONS, SMALL_MOTIONS};
 use super::variants::{over_range, with_friction, with_kind};
 use super::{Verification, VerifyError};
 
@@ -59,8 +60,9 @@ pub(super) const MOST_RUNS: usize = {
     let scaled = CHOICE_SINES;
     let confirmed = (1 + MAX_CANDIDATES) * withheld;
     let instead = kinds * (SINES.len() - COMPARISON_SINES) + shares * SINES.len();
-    let all_small = SMALL_SINES.len() + MARGIN_SINES;
-    let small = (3 + REMEDIES.len()) * all_small + REMEDIES.len() * SINES.len();
+    let all_small = SMALL_MOTIONS.len() + MARGIN_MOTIONS;
+    let remedies = REMEDIES.len() + LESS.len() + FAST_MM_S.len();
+    let small = (3 + remedies) * all_small + remedies * SINES.len();
     let learning = SINES.len() + 2 * all_small;
     alone + compared + refined + scaled + confirmed + instead + small + learning
 };
@@ -81,9 +83,9 @@ pub(super) struct Trials<'a, 'b> {
     kinds: Vec<LawResult>,
     /// The same that make the axis jump.
     jumping: Vec<LawResult>,
-    /// The PID's scores on the small slow sines, once it has run on them.
-    pub(super) pid_when_small: Vec<Score>,
-    /// Laws that were worse than the PID on a small slow sine.
+    /// The PID's largest errors on the first small slow motions, mm, as far as it has run on them.
+    pub(super) pid_when_small_mm: Vec<f64>,
+    /// Laws that were worse than the PID on a small slow motion.
     pub(super) refused: Vec<Refused>,
     pub(super) drift: Drift,
 }
@@ -127,7 +129,7 @@ impl<'a, 'b> Trials<'a, 'b> {
             laws,
             kinds: Vec::new(),
             jumping: Vec::new(),
-            pid_when_small: Vec::new(),
+            pid_when_small_mm: Vec::new(),
             refused: Vec::new(),
             drift,
         })
@@ -297,6 +299,9 @@ impl<'a, 'b> Trials<'a, 'b> {
         }
         if chosen == 0 && self.npid.feedback != self.pid.feedback {
             chosen = self.without_nonlinear_gain()?;
+        }
+        if chosen == 0 {
+            chosen = self.when_fast()?;
         }
         Ok(chosen)
     }

@@ -3,6 +3,8 @@
 mod recorder;
 mod watch;
 
+use std::collections::VecDeque;
+
 use self::recorder::{Period, Recorder};
 use self::watch::Watch;
 use quadrant_law::command::Command;
@@ -50,6 +52,8 @@ pub struct SimulatedTestAxis {
     travel: Travel,
     /// Largest distance of the table from the middle of the travel so far, mm.
     farthest_mm: f64,
+    /// Loads of the next control periods with enabled outputs, V.
+    loads_v: VecDeque<f64>,
     /// The recording of the last experiment, if that was stopped.
     interrupted: Option<Recording>,
     /// The axis under test is the first; the others stand still.
@@ -83,6 +87,7 @@ impl SimulatedTestAxis {
             resolution_mm: truth.resolution_mm,
             travel: Travel::BUILT_IN,
             farthest_mm: 0.0,
+            loads_v: VecDeque::new(),
             interrupted: None,
             plant: SimulatedAxis::new(truth, stage.rate_hz, seed),
             stage,
@@ -118,8 +123,15 @@ impl SimulatedTestAxis {
         self.farthest_mm
     }
 
+    /// Loads the table from outside, V at the amplifier input, one a control period from when the outputs are enabled.
+    pub fn load(&mut self, loads_v: impl IntoIterator<Item = f64>) {
+        self.loads_v = loads_v.into_iter().collect();
+    }
+
     /// One control period of the plant.
     fn move_on(&mut self, code: DacCode, enabled: bool) {
+        let load_v = self.loads_v.pop_front_if(|_| enabled);
+        self.plant.set_load_v(load_v.unwrap_or(0.0));
         self.plant.step(code, enabled);
         let position_mm = self.plant.position_mm() + self.travel.start_mm();
         self.farthest_mm = self.farthest_mm.max(position_mm.abs());
