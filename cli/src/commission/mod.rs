@@ -857,7 +857,8 @@ mod tests {
                 });
             }
             let mut recording = self.axis.perform(experiment, progress)?;
-            if experiment.name.starts_with("N-PID") {
+            let name = &experiment.name;
+            if name.starts_with("N-PID") || name.starts_with("PID + ") {
                 for position_mm in recording.position_mm.iter_mut().step_by(2) {
                     *position_mm += 0.5;
                 }

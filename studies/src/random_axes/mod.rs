@@ -119,8 +119,10 @@ pub enum Outcome {
     Commissioned,
     /// Nothing was better than the PID, and its settings were kept.
     PidAlone,
-    /// The chosen settings are worse than the PID on a motion that the commissioning did not see.
+    /// The chosen settings are worse than the PID on a sine that the commissioning did not see.
     WorseThanPid,
+    /// They are worse on a move alone.
+    WorseOnMoves,
     /// Settings were chosen that are worse than the PID on small slow sines alone.
     WorseWhenSmall,
     /// The commissioning ended early, and its reason names the resonance that the axis has.
@@ -530,24 +532,31 @@ impl Line {
                 {
                     self.small.few_counts = errors.to_string();
                 }
-                let worse = motions.iter().zip(&errors_mm);
-                let worse: Vec<String> = worse
+                let worse: Vec<(&Motion, &Compared)> = motions
+                    .iter()
+                    .zip(&errors_mm)
                     .filter(|(_, errors)| errors.is_worse())
-                    .map(|(motion, errors)| format!("{motion}: {errors}"))
                     .collect();
+                let moves = |(motion, _): &(&Motion, &Compared)| matches!(motion, Motion::Moves(_));
                 self.outcome = if worse.is_empty() {
                     Outcome::Commissioned
+                } else if worse.iter().all(moves) {
+                    Outcome::WorseOnMoves
                 } else {
-                    self.reason = worse.join("; ");
                     Outcome::WorseThanPid
                 };
+                let described = worse
+                    .iter()
+                    .map(|(motion, errors)| format!("{motion}: {errors}"));
+                self.reason = described.collect::<Vec<_>>().join("; ");
             }
             Err(reason) => {
                 self.outcome = Outcome::WorseThanPid;
                 self.reason = reason;
             }
         }
-        if judging == Judging::SmallToo && self.outcome == Outcome::Commissioned {
+        let is_good = matches!(self.outcome, Outcome::Commissioned | Outcome::WorseOnMoves);
+        if judging == Judging::SmallToo && is_good {
             self.judge_small(judge);
         }
         if judging == Judging::SmallToo {

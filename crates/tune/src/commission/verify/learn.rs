@@ -20,8 +20,10 @@ impl Trials<'_, '_> {
         let name = format!("{}, learning", fixed.law);
         let was_refused = |name: &str| self.refused.iter().any(|refused| refused.law == name);
         let is_fixed_refused = was_refused(&fixed.law);
-        let was_tried = was_refused(&name) || self.laws.iter().any(|law| law.law == name);
-        if was_tried && !is_fixed_refused {
+        // One that lost by learning on the usual sines does so with less friction on small motions, too.
+        let mut laws = self.laws.iter();
+        let has_lost = laws.any(|law| law.settings.feedforward.learning.is_some());
+        if has_lost || was_refused(&name) && !is_fixed_refused {
             return Ok(None);
         }
         let mut settings = fixed.settings.clone();

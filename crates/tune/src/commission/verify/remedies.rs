@@ -55,6 +55,16 @@ const MOST_STROKE_MM: f64 = 0.12;
 const STROKES: &str = ", strokes from ";
 
 impl Remedy {
+    /// The same for a law that may have no nonlinear gain to lose.
+    fn suiting(self, law: &LawResult, pid: &AxisSettings) -> Self {
+        match self {
+            Self::LinearFrom(from_mm_s) if law.settings.feedback == pid.feedback => {
+                Self::From(from_mm_s)
+            }
+            remedy => remedy,
+        }
+    }
+
     /// The changed law, its name and settings; none where it changes nothing that the one before has not. `pid`: the PID alone.
     fn of(self, law: &LawResult, pid: &AxisSettings) -> Option<(String, AxisSettings)> {
         let name = &law.law;
@@ -126,12 +136,8 @@ impl Trials<'_, '_> {
 
     /// Index of a law with less of another's friction that is not far worse than the PID on any small slow motion; the PID's without one.
     fn less_of(&mut self, whole: &LawResult) -> Result<usize, VerifyError> {
-        let is_linear = whole.settings.feedback == self.pid.feedback;
         for remedy in LESS {
-            let remedy = match remedy {
-                Remedy::LinearFrom(from_mm_s) if is_linear => Remedy::From(from_mm_s),
-                remedy => remedy,
-            };
+            let remedy = remedy.suiting(whole, &self.pid);
             let Some(mut found) = self.begin_remedy(remedy, whole) else {
                 continue;
             };
@@ -163,7 +169,8 @@ impl Trials<'_, '_> {
             return Err(stopped.into());
         }
         for from_mm_s in FAST_MM_S {
-            if let Some((found, worst)) = self.try_remedy(Remedy::LinearFrom(from_mm_s), &best)?
+            let remedy = Remedy::LinearFrom(from_mm_s).suiting(&best, &self.pid);
+            if let Some((found, worst)) = self.try_remedy(remedy, &best)?
                 && worst <= MAX_SCATTER_RATIO
             {
                 return Ok(found);
@@ -268,6 +275,8 @@ mod tests {
             settings: pid.clone(),
             ..law
         };
-        assert_eq!(Remedy::LinearFrom(1.6).of(&linear, &pid), None);
+        let remedy = Remedy::LinearFrom(1.6);
+        assert_eq!(remedy.of(&linear, &pid), None);
+        assert!(remedy.suiting(&linear, &pid).of(&linear, &pid).is_some());
     }
 }

@@ -13,6 +13,8 @@ use super::variants::with_friction;
 /// Largest excess of a largest error over the PID's that counts as none, counts: one, by which that of an axis that sticks scatters, and
 /// what rounding adds.
 const MAX_EXCESS_COUNTS: f64 = 1.1;
+/// The same over the PID's error.
+const MAX_EXCESS_RATIO: f64 = 1.02;
 
 /// Factor on the friction fed forward with which a law is not to be worse either, on the short sines: friction falls by as much where an
 /// axis warms, or its lubricant spreads.
@@ -184,7 +186,7 @@ impl Trials<'_, '_> {
 
 /// True if a largest error exceeds the PID's by more than chance.
 fn is_worse(own_mm: f64, pid_mm: f64, count_mm: f64) -> bool {
-    own_mm - pid_mm > MAX_EXCESS_COUNTS * count_mm
+    own_mm - pid_mm > MAX_EXCESS_COUNTS * count_mm && own_mm > MAX_EXCESS_RATIO * pid_mm
 }
 
 #[cfg(test)]
@@ -192,8 +194,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_law_is_worse_where_its_largest_error_exceeds_the_pids_by_more_than_a_count() {
+    fn a_law_is_worse_where_its_largest_error_exceeds_the_pids_by_more_than_a_count_and_a_fiftieth()
+    {
         assert!(!is_worse(41e-3, 40e-3, 1e-3));
         assert!(is_worse(41.2e-3, 40e-3, 1e-3));
+        assert!(!is_worse(71.3e-3, 70e-3, 1e-3));
+        assert!(is_worse(71.5e-3, 70e-3, 1e-3));
     }
 }
