@@ -41,8 +41,8 @@ const fn moves(distance_mm: f64, velocity_mm_s: f64) -> SmallMotion {
     })
 }
 
-/// What throws a table behind a spring depends on the frequency: the short sines are at 3 to 12 Hz, and many of their cycles count, for an
-/// axis that sticks does not do the same in each. The last ones are slow, or longer at a moderate speed: they show an axis that meets less
+/// The small slow motions. The frequency decides if a table behind a spring is thrown: the short sines are at 3 to 12 Hz, and many of their
+/// cycles count, for an axis that sticks does not do the same in each. The last ones are slow, or longer at a moderate speed: they show an axis that meets less
 /// friction at such a speed than is fed forward.
 pub(super) const SMALL_MOTIONS: [SmallMotion; 21] = [
     sine(0.02, 0.6, Cycles::scoring(9)),
