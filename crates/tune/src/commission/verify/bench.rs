@@ -15,17 +15,19 @@ use crate::test_axis::{ExperimentError, MachineError, TestAxis, approach};
 /// Amplitude over the RMS error from which on an oscillation is most of the error: a reversal is followed by one, too, but it decays.
 const MIN_DOMINANT_RATIO: f64 = 1.0;
 
+/// Largest share of the trials that is reported: they may take longer than expected.
+const MAX_PROGRESS: f64 = 0.99;
+
 /// The axis that laws run on.
 pub(super) struct Bench<'a> {
     pub(super) test_axis: &'a mut dyn TestAxis,
     pub(super) sines: &'a [SineTest],
     pub(super) small_motions: &'a [SmallMotion],
     pub(super) progress: &'a mut dyn FnMut(f64),
-    /// Runs that were made, and that are made at most.
-    pub(super) done: usize,
-    pub(super) most_runs: usize,
-    /// Time for which the axis has run on sines, s.
+    /// Time for which the axis has run on motions, s.
     pub(super) used_s: f64,
+    /// Time for which it does where the first choice is not worse than the PID anywhere, s.
+    pub(super) expected_s: f64,
     /// True while oscillations are looked for, which takes longer than anything else here: of the PID alone.
     pub(super) detects_ringing: bool,
     /// The interruption by a person, after which nothing more runs.
@@ -136,12 +138,12 @@ impl Bench<'_> {
         if self.interrupted.is_some() {
             return Ok(None);
         }
-        let (done, most) = (self.done as f64, self.most_runs as f64);
+        let (used_s, expected_s) = (self.used_s, self.expected_s);
         let progress = &mut *self.progress;
-        let mut report = |share: f64| progress(((done + share) / most).min(1.0));
+        let mut report =
+            |share: f64| progress(((used_s + share * lasts_s) / expected_s).min(MAX_PROGRESS));
         let outcome = approach(self.test_axis, 0.0)
             .and_then(|()| run(self.test_axis, &result.law, &mut report));
-        self.done += 1;
         match outcome {
             Ok(ran) => {
                 self.used_s += lasts_s;

@@ -22,7 +22,7 @@ pub use self::sines::{Cycles, run_cycles, run_sine, sines};
 pub use self::small::{Refused, Worse};
 use self::small_motions::small_motions;
 pub use self::small_motions::{Moves, SmallMotion, run_moves};
-use self::trials::{KINDS, MOST_RUNS, REPEATS, Trials};
+use self::trials::{KINDS, REPEATS, Trials};
 use super::drift::Drift;
 use super::ringing::Ringing;
 use crate::test_axis::{AxisInfo, ExperimentError, MachineError, TestAxis};
@@ -133,9 +133,8 @@ pub fn verify(
         sines: &sines,
         small_motions: &small_motions,
         progress,
-        done: 0,
-        most_runs: MOST_RUNS,
         used_s: 0.0,
+        expected_s: lasts_s(&info),
         detects_ringing: true,
         interrupted: None,
     };

@@ -17,7 +17,7 @@ use super::variants::{feeding_beyond, feeding_from, with_friction};
 
 /// Change of a law that is worse than the PID on small slow motions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Remedy {
+enum Remedy {
     /// No friction fed forward on motions up to a velocity, mm/s.
     From(f64),
     /// The same without the nonlinear gain: on such motions it is the PID.
@@ -27,7 +27,7 @@ pub(super) enum Remedy {
 }
 
 /// Remedies in the order in which they are tried: the first that is not worse than the PID on any sine is chosen.
-pub(super) const REMEDIES: [Remedy; 4] = [
+const REMEDIES: [Remedy; 4] = [
     Remedy::From(0.4),
     Remedy::From(0.8),
     Remedy::From(FROM_MM_S),
@@ -38,9 +38,9 @@ pub(super) const REMEDIES: [Remedy; 4] = [
 /// scatters by more than [`MAX_SCATTER_RATIO`].
 const MAX_REMEDY_RATIO: f64 = 1.1;
 /// Velocities up to which no friction is fed forward where it is worse than the PID on usual sines, mm/s.
-pub(super) const FAST_MM_S: [f64; 2] = [FROM_MM_S, 5.0];
+const FAST_MM_S: [f64; 2] = [FROM_MM_S, 5.0];
 /// Remedies that are tried where the whole of a law is far worse than the PID when small, and no other remedy is not worse at all.
-pub(super) const LESS: [Remedy; 4] = [
+const LESS: [Remedy; 4] = [
     Remedy::LinearFrom(FAST_MM_S[0]),
     Remedy::LinearFrom(FAST_MM_S[1]),
     Remedy::Share(0.6),

@@ -44,7 +44,7 @@ const fn moves(distance_mm: f64, velocity_mm_s: f64) -> SmallMotion {
 /// The small slow motions. The frequency decides if a table behind a spring is thrown: the short sines are at 3 to 12 Hz, and many of their
 /// cycles count, for an axis that sticks does not do the same in each. The last ones are slow, or longer at a moderate speed: they show an axis that meets less
 /// friction at such a speed than is fed forward.
-pub(super) const SMALL_MOTIONS: [SmallMotion; 21] = [
+const SMALL_MOTIONS: [SmallMotion; 21] = [
     sine(0.02, 0.6, Cycles::scoring(9)),
     sine(0.02, 0.9, Cycles::scoring(9)),
     sine(0.02, 1.2, Cycles::scoring(9)),

@@ -8,10 +8,8 @@ use super::super::bootstrap::measuring_settings;
 use super::super::drift::Drift;
 use super::bench::Bench;
 use super::law_result::{LawResult, MAX_ERROR_RATIO, MAX_SCATTER_RATIO};
-use super::remedies::{FAST_MM_S, LESS, REMEDIES};
-use super::sines::{CHOICE_SINES, COMPARISON_SINES, SINES};
+use super::sines::{CHOICE_SINES, COMPARISON_SINES};
 use super::small::Refused;
-use super::small_motions::{MARGIN_MOTIONS, SMALL_MOTIONS};
 use super::variants::{over_range, with_friction, with_kind};
 use super::{Verification, VerifyError};
 
@@ -50,22 +48,6 @@ const MAX_RETRY_RATIO: f64 = 1.25;
 const REPEATED_PID: &str = "PID, again";
 /// Number of the PID's further runs.
 pub(super) const REPEATS: usize = 3;
-
-/// Runs that all trials make at most.
-pub(super) const MOST_RUNS: usize = {
-    let (withheld, kinds, shares) = (SINES.len() - CHOICE_SINES, KINDS.len(), SHARES.len());
-    let alone = 2 * CHOICE_SINES + REPEATS;
-    let compared = (kinds + 2 * MAX_STRETCHES as usize) * COMPARISON_SINES;
-    let refined = (1 + OTHER_KINDS) * (CHOICE_SINES - COMPARISON_SINES) + shares * CHOICE_SINES;
-    let scaled = CHOICE_SINES;
-    let confirmed = (1 + MAX_CANDIDATES) * withheld;
-    let instead = kinds * (SINES.len() - COMPARISON_SINES) + shares * SINES.len();
-    let all_small = SMALL_MOTIONS.len() + MARGIN_MOTIONS;
-    let remedies = REMEDIES.len() + LESS.len() + FAST_MM_S.len();
-    let small = (3 + remedies) * all_small + remedies * SINES.len();
-    let learning = SINES.len() + 2 * all_small;
-    alone + compared + refined + scaled + confirmed + instead + small + learning
-};
 
 /// Trials under way.
 pub(super) struct Trials<'a, 'b> {
