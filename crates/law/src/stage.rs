@@ -653,19 +653,19 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
                 axis.hold_here(memory);
             }
         } else if state.safety.is_enabled() {
-            self.start(state, command, tick);
+            self.start(plan, state, command, tick);
         }
     }
 
     /// Starts or ends motions of an enabled stage, as an admitted command says.
-    fn start(&self, state: &mut StageState<S, N>, command: Command, tick: u32) {
+    fn start(&self, plan: &Plan<S>, state: &mut StageState<S, N>, command: Command, tick: u32) {
         match command {
             Command::Enable | Command::Disable | Command::ResetFault => return,
             Command::Stop => self.end_injection(state),
             _ => state.held = None,
         }
         if command == Command::StartInjection {
-            self.start_injection(state, tick);
+            self.start_injection(plan, state, tick);
             return;
         }
         for ((axis, memory), name) in self
@@ -674,7 +674,12 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             .zip(&mut state.axes)
             .zip(AxisName::ALL)
         {
-            if command.axis().is_none_or(|only| only == name) {
+            if command.axis().is_some_and(|only| only != name) {
+                continue;
+            }
+            if matches!(command, Command::Run | Command::StartMove(_)) {
+                axis.run(memory, &plan[name]);
+            } else {
                 axis.handle_command(memory, command);
             }
         }
@@ -694,7 +699,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
     }
 
     /// Begins the injection that is ready.
-    fn start_injection(&self, state: &mut StageState<S, N>, tick: u32) {
+    fn start_injection(&self, plan: &Plan<S>, state: &mut StageState<S, N>, tick: u32) {
         let Some(injection) = state.injection.injection() else {
             return;
         };
@@ -704,8 +709,9 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             Coupling::Added => {}
             Coupling::OpenLoop => self.axes[name].open_loop(&mut state.axes[name]),
             Coupling::WithPlan => {
-                for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
-                    axis.handle_command(memory, Command::Run);
+                for ((axis, memory), motion) in self.axes.into_iter().zip(&mut state.axes).zip(plan)
+                {
+                    axis.run(memory, motion);
                 }
             }
         }

@@ -39,6 +39,8 @@ const FRICTION_ERROR: f64 = 1.5;
 const SILENT_FRICTIONS: f64 = 2.0;
 /// Least share of breakaway that friction takes up, even if the settings call it stiffer.
 const HELD_FRICTIONS: f64 = 0.65;
+/// Friction that eases under a vibration while an axis stands, over breakaway.
+const EASED_FRICTIONS: f64 = 1.5;
 /// Friction of an axis that stands after it slid, over breakaway.
 const STUCK_FRICTIONS: f64 = 0.75;
 /// The same on an axis that slides.
@@ -305,6 +307,7 @@ impl AxisSettings {
             // Beyond it, a step of the encoder is a jump.
             largest_mm_s: 2.0 * self.limits.max_velocity_mm_s,
             held_v: (HELD_ERROR * held_v).max(HELD_FRICTIONS * breakaway_v),
+            eased_v: EASED_FRICTIONS * breakaway_v,
             stuck_v: STUCK_FRICTIONS * breakaway_v,
             sliding_v: SLIDING_FRICTIONS * breakaway_v,
             turned_v: TURNED_FRICTIONS * breakaway_v,

@@ -15,7 +15,7 @@ use quadrant_cli::warn;
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
-use quadrant_law::safety::SafetyState;
+use quadrant_law::safety::{FaultCode, SafetyState};
 use quadrant_settings::StageSettings;
 use quadrant_sim::identified_stage::identified_settings;
 use quadrant_sim::law_machine::Operator;
@@ -237,14 +237,17 @@ impl Case {
         most <= SAME_FRICTION * least && !happens(enters_s) && !happens(leaves_s)
     }
 
-    /// Runs the case; nothing of a run that a fault ended.
+    /// Runs the case.
+    ///
+    /// # Errors
+    /// The fault that ended it, and its time in s.
     fn run(
         &self,
         stage: &StageSettings,
         feedforward: Feedforward,
         cancels: bool,
         seed: u64,
-    ) -> Option<Run> {
+    ) -> Result<Run, (FaultCode, f64)> {
         let mut axis = stage.axes[0].clone();
         axis.feedback.law = self.law;
         feedforward.apply(&mut axis);
@@ -258,7 +261,8 @@ impl Case {
         let cycles = RUN_S * self.velocity_mm_s / (std::f64::consts::TAU * self.amplitude_mm);
         let sine =
             HarmonicSettings::with_velocity(self.amplitude_mm, self.velocity_mm_s, cycles, LEAD_S);
-        let mut machine = law_of(&axis, stage, MotionSettings::Harmonic(sine)).ok()?;
+        let mut machine = law_of(&axis, stage, MotionSettings::Harmonic(sine))
+            .expect("the settings of the repository");
         let load = Load::Milling {
             cut: self.cut,
             component: self.component,
@@ -285,8 +289,8 @@ impl Case {
             let counts = [plant.read_counter(), 0, 0];
             let outputs = machine.tick(&TickInput::of_counts(counts, operator.request(tick)));
             let state = machine.state();
-            if matches!(state.safety(), SafetyState::Faulted(_)) {
-                return None;
+            if let SafetyState::Faulted(fault) = state.safety() {
+                return Err((fault.code, time_s));
             }
             if state.is_running() {
                 let load_v = load.at_v(time_s);
@@ -312,7 +316,7 @@ impl Case {
             }
             plant.step(outputs.codes[0], outputs.enabled);
         }
-        Some(Run { errors, moments })
+        Ok(Run { errors, moments })
     }
 
     /// Writes the runs side by side, a line every millisecond, as CSV.
@@ -442,6 +446,7 @@ pub fn judge(seed: u64, friction: TrueFriction, traces: Option<&Path>) -> Line {
     let stage = identified_settings()
         .expect("the settings of the repository")
         .stage;
+    let mut described = case.describe();
     let runs = [
         ("off", Feedforward::Without, false),
         ("fixed", Feedforward::Fixed, false),
@@ -450,7 +455,11 @@ pub fn judge(seed: u64, friction: TrueFriction, traces: Option<&Path>) -> Line {
     ]
     .map(|(name, feedforward, cancels)| {
         let run = case.run(&stage, feedforward, cancels, seed);
-        (name, run.unwrap_or_default())
+        let run = run.unwrap_or_else(|(fault, time_s)| {
+            described += &format!("; {name}: {} at {time_s:.1} s", fault.name());
+            Run::default()
+        });
+        (name, run)
     });
     let [(_, off), (_, fixed), (_, learning), (_, cancelling)] = &runs;
     let without = windows(off);
@@ -472,6 +481,6 @@ pub fn judge(seed: u64, friction: TrueFriction, traces: Option<&Path>) -> Line {
         fixed: compared(fixed),
         learning: compared(learning),
         cancelling: compared(cancelling),
-        case: case.describe(),
+        case: described,
     }
 }

@@ -509,10 +509,18 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         }
     }
 
+    /// Starts the motion of the plan, which the axis will be given in every tick, from where the reference stands. Unlike
+    /// [`Command::Run`], it tells the axis how long the strokes will be.
+    pub fn run(&self, state: &mut AxisState<S, N>, motion: &Motion<S>) {
+        self.handle_command(state, Command::Run);
+        state.oscillation.set_stroke(motion.stroke_counts());
+    }
+
     /// Starts or ends a motion, from where the reference stands. Only what
     /// [`admission`](crate::admission::refusal) lets through may come here.
     pub fn handle_command(&self, state: &mut AxisState<S, N>, command: Command) {
         let (generator, here) = (&mut state.generator, state.look_ahead);
+        state.oscillation.set_stroke(0);
         match command {
             Command::Run | Command::StartMove(_) => self.generator.start_plan(generator, here),
             Command::Jog(_, velocity) => {

@@ -263,6 +263,11 @@ impl<S: Scalar> Harmonic<S> {
     }
 
     /// True if the motion has an end.
+    /// The way from one turn to the next, counts.
+    pub(super) fn stroke_counts(&self) -> u64 {
+        2 * u64::from(self.amplitude_counts.unsigned_abs())
+    }
+
     pub(super) const fn ends(&self) -> bool {
         self.end_tick != NEVER
     }

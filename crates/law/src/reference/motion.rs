@@ -102,6 +102,16 @@ impl<S: Scalar> Motion<S> {
         }
     }
 
+    /// Length of the motion's strokes, counts, where it is known before they end; else 0.
+    pub(crate) fn stroke_counts(&self) -> u32 {
+        let counts = match self {
+            Self::PointToPoint(to_point) => to_point.counts(),
+            Self::Harmonic(harmonic) => harmonic.stroke_counts(),
+            Self::Hold | Self::Recorded(_) | Self::Given(_) => 0,
+        };
+        counts.min(u64::from(u32::MAX)) as u32
+    }
+
     /// True if the motion has an end.
     pub fn ends(&self) -> bool {
         match self {

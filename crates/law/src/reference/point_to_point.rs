@@ -9,7 +9,7 @@ use super::motion_state::MotionState;
 use super::sample::{MotionScale, ReferenceSample};
 use crate::rounding;
 use crate::scalar::{Quantity, Scalar};
-use crate::units::{POSITION_UNITS_PER_COUNT, Position};
+use crate::units::{POSITION_FRACTION_BITS, POSITION_UNITS_PER_COUNT, Position};
 
 /// A move as a person writes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,6 +114,11 @@ impl<S: Scalar> PointToPoint<S> {
                 Quantity::Acceleration,
             ),
         }
+    }
+
+    /// The distance, counts.
+    pub(super) fn counts(&self) -> u64 {
+        self.target.0.unsigned_abs() >> POSITION_FRACTION_BITS
     }
 
     // Not inlined: its wide integers would crowd the registers of the motions that run for hours.

@@ -11,7 +11,8 @@
 //!   returns at once with a stroke more than twice as long, in which it need not harm.
 //! - **Slow or short motions**, where the settings say that friction fed forward does harm there: it fades within 50 ms by the largest speed
 //!   of the reference in this stroke and the one before, and by the longer one of both, so that a reversal of a fast or long motion still
-//!   has all of it. After a second at rest, a motion is slow until it is fast, and long until it turns.
+//!   has all of it. After a second at rest, a motion is slow until it is fast, and long until it turns. Of a move or a sine of the plan, the
+//!   length is known from the start.
 //! - **Hum.** At rest, the error swings evenly at 20 Hz or more for a second. It is reported, and nothing is done.
 //! - **Instability.** The error swings evenly for a second, each time by more than a limit and by more than twice the distance
 //!   that the reference goes meanwhile. That is a fault.
@@ -174,6 +175,8 @@ pub struct OscillationState {
     reduced: u8,
     /// The same because the motion is slow.
     faded: u8,
+    /// Length of the strokes of the motion under way, counts; 0 if it is not known.
+    stroke_counts: u32,
     pace: Pace,
     phase: Phase,
     /// Looks in the phase, and until the next trial.
@@ -364,6 +367,9 @@ impl<S: Scalar> Oscillation<S> {
             } else {
                 (pace.most, pace.way)
             };
+            if state.stroke_counts > 0 {
+                pace.way_before = state.stroke_counts;
+            }
             (pace.most, pace.way) = (0, 0);
         }
         pace.most = pace.most.max(speed);
@@ -570,6 +576,11 @@ impl OscillationState {
     /// The oscillation that was found last.
     pub fn reading(&self) -> OscillationReading {
         self.reading
+    }
+
+    /// Takes the length of the strokes of the motion that begins, counts; 0 if it is not known.
+    pub fn set_stroke(&mut self, stroke_counts: u32) {
+        self.stroke_counts = stroke_counts;
     }
 
     /// Forgets everything but what has been reported: the settings have changed, or the outputs are off.

@@ -109,6 +109,8 @@ pub struct PlausibilityModel {
     pub largest_mm_s: f64,
     /// Change of the voltage that need not show as motion, in closed loop, V.
     pub held_v: f64,
+    /// The same of a change towards zero, as far as there was that much voltage when the axis came to rest, V.
+    pub eased_v: f64,
     /// What friction takes up while the axis stands, in the sense in which it last slid, beyond the voltage at which it slid, V.
     pub stuck_v: f64,
     /// The same while an axis that slides does not follow, V.
@@ -155,6 +157,7 @@ pub struct Plausibility {
     /// Share of the way to the output that the lagging force goes, 2^-32.
     lag: i32,
     held: i32,
+    eased: i32,
     stuck: i32,
     sliding: i32,
     turned: i32,
@@ -299,6 +302,7 @@ impl Plausibility {
             shift,
             lag: share(interval_s / (model.delay_s + filter_s)),
             held: force(model.held_v),
+            eased: force(model.eased_v),
             stuck: force(model.stuck_v),
             sliding: force(model.sliding_v),
             turned: force(model.turned_v),
@@ -527,6 +531,17 @@ impl Plausibility {
         }
     }
 
+    /// The change of the force since the axis stands, beyond what friction takes up of it; of one towards zero friction may take up as
+    /// much as there was, since under a vibration it eases without a motion.
+    #[inline(always)]
+    fn beyond_held(&self, state: &PlausibilityState) -> i32 {
+        let eased = state.anchor.clamp(-self.eased, self.eased);
+        let change = state.force.saturating_sub(state.anchor);
+        let forth = self.held.max(-eased);
+        let back = self.held.max(eased);
+        change.saturating_sub(forth).max(0) + change.saturating_add(back).min(0)
+    }
+
     /// False if the encoder stands though the axis must have moved.
     #[inline(always)]
     fn stands(&self, state: &mut PlausibilityState, counts: i32, open: bool) -> bool {
@@ -538,7 +553,7 @@ impl Plausibility {
             state.modelled = 0;
         } else {
             state.silent = state.silent.saturating_add(1);
-            let held = beyond(state.force.saturating_sub(state.anchor), self.held);
+            let held = self.beyond_held(state);
             let mut force = larger(held, self.beyond_sliding(state));
             if open && force == 0 {
                 let mut allowed = self.breakaway;

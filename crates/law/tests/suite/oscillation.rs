@@ -5,7 +5,7 @@ use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::learning::LearningSettings;
-use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant_law::safety::FaultCode;
 use quadrant_law::safety::oscillation::{
     Oscillation, OscillationInput, OscillationKind, OscillationReading, OscillationState,
@@ -540,6 +540,37 @@ fn friction_is_fed_forward_on_strokes_beyond_a_length_and_on_the_first_one_after
     // Nobody knows how long it will be.
     shown.strokes(1, 80, 10);
     assert_eq!(shown.acts(), 1.0, "from rest");
+}
+
+#[test]
+fn a_move_of_the_plan_is_known_to_be_short_before_it_ends() {
+    fn friction_v(from_mm: f64, distance_mm: f64) -> f64 {
+        let settings = x_alone(|x| {
+            x.feedforward.kind = FeedforwardKind::Gms;
+            x.feedforward.from_mm = from_mm;
+        });
+        let [axis, ..] = StageParameters::real().axes;
+        let motion = MotionSettings::PointToPoint(PointToPointSettings {
+            distance_mm,
+            max_velocity_mm_s: 1.0,
+            max_acceleration_mm_s2: 100.0,
+            max_jerk_mm_s3: 1e4,
+        });
+        let mut plan = PlanSettings::default();
+        plan.motions[0] = motion;
+        let mut bench = Bench::<f32>::new(&settings, axis, &plan);
+        bench.run(1.2);
+        bench.command(Command::Run);
+        bench.run(0.1);
+        let fed = &bench.rig.state.axes()[0].telemetry().feedforward;
+        fed.presliding.to_f64(Quantity::Voltage)
+    }
+    // A tenth of a second into it, of 0.4 s and 4 s.
+    for (distance_mm, is_fed) in [(0.4, false), (4.0, true)] {
+        let (fed, whole) = (friction_v(0.5, distance_mm), friction_v(0.0, distance_mm));
+        assert!(whole > 0.02, "{distance_mm} mm: {whole} V");
+        assert_eq!(fed, if is_fed { whole } else { 0.0 }, "{distance_mm} mm");
+    }
 }
 
 #[test]

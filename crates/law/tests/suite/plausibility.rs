@@ -55,6 +55,7 @@ fn model() -> PlausibilityModel {
         limit_v: 10.0,
         largest_mm_s: 300.0,
         held_v: 0.6,
+        eased_v: 0.0,
         // Of no concern, but to those that set them.
         stuck_v: NEVER_V,
         sliding_v: NEVER_V,
@@ -229,6 +230,49 @@ fn an_encoder_that_stands_is_found_when_the_model_has_gone_the_distance() {
                     found,
                 );
             }
+        }
+    }
+}
+
+#[test]
+fn a_force_that_falls_towards_zero_while_an_axis_stands_is_friction_that_eases() {
+    const STOPS_S: f64 = 0.5;
+    const FALLS_V_PER_S: f64 = 2.0;
+    for eased_v in [0.0, 1.5] {
+        let model = PlausibilityModel {
+            eased_v,
+            load_v: NEVER_V,
+            first_load_v: NEVER_V,
+            ..model()
+        };
+        // From below what may ease, and from above it; a gain that the amplifier reverses, too.
+        for (words, level_v) in AMPLIFIERS
+            .into_iter()
+            .flat_map(|words| [1.2_f64, -1.2, 2.5].map(|level_v| (words, level_v)))
+        {
+            let axis = Plausibility::new(&model, words, COUNT_MM, PERIOD_S);
+            let volts = |time_s: f64| {
+                let fallen_v = FALLS_V_PER_S * (time_s - STOPS_S).max(0.0);
+                level_v - fallen_v * level_v.signum()
+            };
+            // One that a load holds moves on whatever its voltage is.
+            let creeps = |time_s: f64| (2.0 * time_s.min(STOPS_S), 0.0);
+            let (mut force, mut velocity, mut distance) = (0.0_f64, 0.0_f64, 0.0_f64);
+            let found = expected(|now_s| {
+                force += (volts(now_s) - force) * INTERVAL_S / (model.delay_s + FILTER_S);
+                if now_s < STOPS_S {
+                    return false;
+                }
+                let taken = model.held_v.max(eased_v.min(level_v.abs()));
+                let fallen = (level_v - force) * level_v.signum();
+                velocity += (model.gain_mm_per_v_s2 * (fallen - taken).max(0.0)
+                    - model.damping_per_s * velocity)
+                    * INTERVAL_S;
+                distance += velocity * INTERVAL_S - distance * INTERVAL_S / FORGET_S;
+                distance > model.distance_mm
+            });
+            let seen = time_until_found(&axis, words, false, volts, creeps);
+            near(&format!("{words:?}, {level_v} V, {eased_v} V"), seen, found);
         }
     }
 }
@@ -553,6 +597,7 @@ const SLIDES_S: f64 = 0.3;
 fn following_model() -> PlausibilityModel {
     PlausibilityModel {
         held_v: NEVER_V,
+        eased_v: 0.0,
         load_v: NEVER_V,
         first_load_v: NEVER_V,
         sliding_v: 0.1,
@@ -675,6 +720,7 @@ fn an_axis_that_slid_and_stands_takes_up_little_more_in_that_sense() {
     let model = PlausibilityModel {
         stuck_v: 0.1,
         held_v: 0.6,
+        eased_v: 0.0,
         ..model()
     };
     let stands = |_| 0.0;
@@ -720,6 +766,7 @@ fn is_found(
         answer_v_per_mm,
         answer_v_s_per_mm,
         held_v: NEVER_V,
+        eased_v: 0.0,
         ..model()
     };
     let axis = Plausibility::new(&model, AMPLIFIERS[0], COUNT_MM, PERIOD_S);
