@@ -500,7 +500,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         *friction = self.feedforward.start();
         generator.reset();
         *plausibility = self.plausibility.start(shown);
-        oscillation.forget();
+        self.oscillation.restart(oscillation);
         *preview = [here; PREVIEW_ROOM];
         *pulse = None;
         self.learning.resume(learning);
@@ -513,14 +513,14 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// [`Command::Run`], it tells the axis how long the strokes will be.
     pub fn run(&self, state: &mut AxisState<S, N>, motion: &Motion<S>) {
         self.handle_command(state, Command::Run);
-        state.oscillation.set_stroke(motion.stroke_counts());
+        state.oscillation.plan(motion.planned_stroke());
     }
 
     /// Starts or ends a motion, from where the reference stands. Only what
     /// [`admission`](crate::admission::refusal) lets through may come here.
     pub fn handle_command(&self, state: &mut AxisState<S, N>, command: Command) {
         let (generator, here) = (&mut state.generator, state.look_ahead);
-        state.oscillation.set_stroke(0);
+        state.oscillation.plan(None);
         match command {
             Command::Run | Command::StartMove(_) => self.generator.start_plan(generator, here),
             Command::Jog(_, velocity) => {
@@ -754,7 +754,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         };
         if changed {
             self.feedforward.go_on(&mut state.friction, step.velocity);
-            state.oscillation.forget();
+            self.oscillation.restart(&mut state.oscillation);
         }
         seen.feedforward = self.feedforward.step(&mut state.friction, step);
         let mut total = seen.feedforward.total();
@@ -959,7 +959,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     fn forget_learnt(&self, state: &mut AxisState<S, N>) {
         state.learning = LearningState::default();
         self.cancelling.start(&mut state.cancelling);
-        state.oscillation.forget();
+        self.oscillation.restart(&mut state.oscillation);
     }
 
     /// Shows an axis whose outputs are off. `changed` says that the settings are new in this tick.
@@ -971,7 +971,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let measured = state.encoder.count();
         state.generator.hold();
         state.injected = S::ZERO;
-        state.oscillation.forget();
+        self.oscillation.restart(&mut state.oscillation);
         state.plausibility = self.plausibility.start(state.shown());
         state.telemetry = AxisTelemetry {
             reference: state.encoder.position(),

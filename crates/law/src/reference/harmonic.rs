@@ -5,6 +5,7 @@
 
 use core::f64::consts::TAU;
 
+use super::motion::PlannedStroke;
 use super::motion_state::MotionState;
 use super::sample::{MotionScale, ReferenceSample};
 use super::sine::{SINE_BITS, SinePolynomial};
@@ -87,6 +88,7 @@ pub struct Harmonic<S: Scalar> {
     tangential: S::Gain,
     q30: S::Gain,
     polynomial: SinePolynomial,
+    stroke: PlannedStroke,
 }
 
 /// The part of a harmonic motion that a tick lies in.
@@ -173,6 +175,10 @@ impl<S: Scalar> Harmonic<S> {
             ),
             q30: S::gain(unit, Quantity::Integer, Quantity::Fraction),
             polynomial: SinePolynomial::FIT,
+            stroke: PlannedStroke::new(
+                Position(amplitude.saturating_mul(2)),
+                settings.amplitude_mm * angular / (scale.resolution_mm * scale.rate_hz),
+            ),
         }
     }
 
@@ -263,9 +269,8 @@ impl<S: Scalar> Harmonic<S> {
     }
 
     /// True if the motion has an end.
-    /// The way from one turn to the next, counts.
-    pub(super) fn stroke_counts(&self) -> u64 {
-        2 * u64::from(self.amplitude_counts.unsigned_abs())
+    pub(super) const fn stroke(&self) -> PlannedStroke {
+        self.stroke
     }
 
     pub(super) const fn ends(&self) -> bool {

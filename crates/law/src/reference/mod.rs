@@ -22,7 +22,7 @@ pub use approach::Approach;
 pub use circle::{Plane, Sense, circle};
 pub use harmonic::{Harmonic, HarmonicSettings};
 pub use jog::JogState;
-pub use motion::{Motion, MotionSettings};
+pub use motion::{Motion, MotionSettings, PlannedStroke};
 pub use motion_state::MotionState;
 pub use point_to_point::{PointToPoint, PointToPointSettings};
 pub use pulses::{

@@ -5,7 +5,9 @@ use super::motion_state::MotionState;
 use super::point_to_point::{PointToPoint, PointToPointSettings};
 use super::recorded::RecordedTable;
 use super::sample::{MotionScale, ReferenceSample};
+use crate::rounding;
 use crate::scalar::Scalar;
+use crate::units::{POSITION_FRACTION_BITS, POSITION_UNITS_PER_COUNT, Position};
 
 /// A motion as a person writes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,6 +35,26 @@ impl MotionSettings {
             Self::PointToPoint(settings) => {
                 (settings.max_velocity_mm_s, settings.max_acceleration_mm_s2)
             }
+        }
+    }
+}
+
+/// The way of a reference from one turn to the next.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PlannedStroke {
+    /// Its length, counts.
+    pub counts: u32,
+    /// Its largest speed, 2^-16 counts a tick.
+    pub speed: u32,
+}
+
+impl PlannedStroke {
+    /// Of a length and a largest displacement in a tick. Settings time only.
+    pub(super) fn new(length: Position, per_tick: f64) -> Self {
+        let counts = length.0.unsigned_abs() >> POSITION_FRACTION_BITS;
+        Self {
+            counts: counts.min(u32::MAX.into()) as u32,
+            speed: rounding::ceil(per_tick * POSITION_UNITS_PER_COUNT) as u32,
         }
     }
 }
@@ -102,14 +124,13 @@ impl<S: Scalar> Motion<S> {
         }
     }
 
-    /// Length of the motion's strokes, counts, where it is known before they end; else 0.
-    pub(crate) fn stroke_counts(&self) -> u32 {
-        let counts = match self {
-            Self::PointToPoint(to_point) => to_point.counts(),
-            Self::Harmonic(harmonic) => harmonic.stroke_counts(),
-            Self::Hold | Self::Recorded(_) | Self::Given(_) => 0,
-        };
-        counts.min(u64::from(u32::MAX)) as u32
+    /// The motion's strokes, where they are known before they end.
+    pub(crate) fn planned_stroke(&self) -> Option<PlannedStroke> {
+        match self {
+            Self::PointToPoint(to_point) => Some(to_point.stroke()),
+            Self::Harmonic(harmonic) => Some(harmonic.stroke()),
+            Self::Hold | Self::Recorded(_) | Self::Given(_) => None,
+        }
     }
 
     /// True if the motion has an end.

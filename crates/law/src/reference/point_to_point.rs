@@ -5,11 +5,12 @@
 //! target to the last unit. Source: Biagiotti and Melchiorri, *FIR filters for online trajectory planning with time-
 //! and frequency-domain specifications*, Control Engineering Practice 20 (2012).
 
+use super::motion::PlannedStroke;
 use super::motion_state::MotionState;
 use super::sample::{MotionScale, ReferenceSample};
 use crate::rounding;
 use crate::scalar::{Quantity, Scalar};
-use crate::units::{POSITION_FRACTION_BITS, POSITION_UNITS_PER_COUNT, Position};
+use crate::units::{POSITION_UNITS_PER_COUNT, Position};
 
 /// A move as a person writes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,6 +75,7 @@ pub struct PointToPoint<S: Scalar> {
     pub(super) target: Position,
     velocity: S::Gain,
     acceleration: S::Gain,
+    stroke: PlannedStroke,
 }
 
 impl<S: Scalar> PointToPoint<S> {
@@ -105,6 +107,10 @@ impl<S: Scalar> PointToPoint<S> {
         };
         Self {
             impulses,
+            stroke: PlannedStroke::new(
+                target,
+                libm::fabs(settings.distance_mm) / (scale.resolution_mm * f64::from(velocity)),
+            ),
             step: (i128::from(target.0) << FRACTION_BITS) / product,
             target,
             velocity: gain(VELOCITY_SHIFT, scale.rate_hz, Quantity::Velocity),
@@ -116,9 +122,8 @@ impl<S: Scalar> PointToPoint<S> {
         }
     }
 
-    /// The distance, counts.
-    pub(super) fn counts(&self) -> u64 {
-        self.target.0.unsigned_abs() >> POSITION_FRACTION_BITS
+    pub(super) const fn stroke(&self) -> PlannedStroke {
+        self.stroke
     }
 
     // Not inlined: its wide integers would crowd the registers of the motions that run for hours.

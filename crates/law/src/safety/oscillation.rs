@@ -11,14 +11,15 @@
 //!   returns at once with a stroke more than twice as long, in which it need not harm.
 //! - **Slow or short motions**, where the settings say that friction fed forward does harm there: it fades within 50 ms by the largest speed
 //!   of the reference in this stroke and the one before, and by the longer one of both, so that a reversal of a fast or long motion still
-//!   has all of it. After a second at rest, a motion is slow until it is fast, and long until it turns. Of a move or a sine of the plan, the
-//!   length is known from the start.
+//!   has all of it. After a second at rest, a motion is slow until it is fast, and long until it turns. Of a move or a sine of the plan, both
+//!   are known from the start. Before the first motion, none is fed forward.
 //! - **Hum.** At rest, the error swings evenly at 20 Hz or more for a second. It is reported, and nothing is done.
 //! - **Instability.** The error swings evenly for a second, each time by more than a limit and by more than twice the distance
 //!   that the reference goes meanwhile. That is a fault.
 //!
 //! All of it is in integers, so that every number type finds the same, and without a division.
 
+use crate::reference::PlannedStroke;
 use crate::rounding;
 use crate::scalar::{Quantity, Scalar};
 
@@ -175,8 +176,8 @@ pub struct OscillationState {
     reduced: u8,
     /// The same because the motion is slow.
     faded: u8,
-    /// Length of the strokes of the motion under way, counts; 0 if it is not known.
-    stroke_counts: u32,
+    /// Strokes of the motion under way, if they are known.
+    planned: Option<PlannedStroke>,
     pace: Pace,
     phase: Phase,
     /// Looks in the phase, and until the next trial.
@@ -312,6 +313,17 @@ impl<S: Scalar> Oscillation<S> {
         }
     }
 
+    /// Forgets everything but what has been reported: the settings have changed, or the outputs are off. Where friction fed forward fades, there
+    /// is none until a motion shows that it is to be.
+    pub(crate) fn restart(&self, state: &mut OscillationState) {
+        let fades = self.slow.from | self.short.from > 0;
+        *state = OscillationState {
+            reading: state.reading,
+            faded: if fades { REDUCTION_STEPS } else { 0 },
+            ..OscillationState::default()
+        };
+    }
+
     /// The share of the friction feedforward that acts, a [`Quantity::Multiplier`], while it is reduced.
     pub fn share(&self, state: &OscillationState) -> S {
         S::scale_integer(
@@ -367,8 +379,8 @@ impl<S: Scalar> Oscillation<S> {
             } else {
                 (pace.most, pace.way)
             };
-            if state.stroke_counts > 0 {
-                pace.way_before = state.stroke_counts;
+            if let Some(planned) = state.planned {
+                (pace.most_before, pace.way_before) = (planned.speed, planned.counts);
             }
             (pace.most, pace.way) = (0, 0);
         }
@@ -578,17 +590,9 @@ impl OscillationState {
         self.reading
     }
 
-    /// Takes the length of the strokes of the motion that begins, counts; 0 if it is not known.
-    pub fn set_stroke(&mut self, stroke_counts: u32) {
-        self.stroke_counts = stroke_counts;
-    }
-
-    /// Forgets everything but what has been reported: the settings have changed, or the outputs are off.
-    pub(crate) fn forget(&mut self) {
-        *self = Self {
-            reading: self.reading,
-            ..Self::default()
-        };
+    /// Takes the strokes of the motion that begins, if they are known.
+    pub fn plan(&mut self, planned: Option<PlannedStroke>) {
+        self.planned = planned;
     }
 
     fn enter(&mut self, phase: Phase) {
