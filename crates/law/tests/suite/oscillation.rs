@@ -543,21 +543,16 @@ fn friction_is_fed_forward_on_strokes_beyond_a_length_and_on_the_first_one_after
 }
 
 #[test]
-fn a_move_of_the_plan_is_known_to_be_short_or_slow_before_it_begins() {
-    /// The largest friction that is fed forward in the first tenth of a second of a move at 1 mm/s, V.
-    fn friction_v(from_mm: f64, from_mm_s: f64, distance_mm: f64) -> f64 {
+fn a_move_or_sine_of_the_plan_is_known_to_be_short_or_slow_before_it_begins() {
+    /// The largest friction that is fed forward in the first tenth of a second of a motion, V.
+    fn friction_v(from_mm: f64, from_mm_s: f64, motion: MotionSettings) -> f64 {
         let settings = x_alone(|x| {
             x.feedforward.kind = FeedforwardKind::Gms;
             (x.feedforward.from_mm, x.feedforward.from_mm_s) = (from_mm, from_mm_s);
         });
         let [axis, ..] = StageParameters::real().axes;
         let mut plan = PlanSettings::default();
-        plan.motions[0] = MotionSettings::PointToPoint(PointToPointSettings {
-            distance_mm,
-            max_velocity_mm_s: 1.0,
-            max_acceleration_mm_s2: 100.0,
-            max_jerk_mm_s3: 1e4,
-        });
+        plan.motions[0] = motion;
         let mut bench = Bench::<f32>::new(&settings, axis, &plan);
         bench.run(1.2);
         bench.command(Command::Run);
@@ -568,17 +563,36 @@ fn a_move_of_the_plan_is_known_to_be_short_or_slow_before_it_begins() {
         };
         (0..1000).map(fed_v).fold(0.0, f64::max)
     }
-    for (from_mm, from_mm_s, distance_mm, is_fed) in [
+    // Strokes of a length at up to 1 mm/s.
+    let moves = |distance_mm: f64| {
+        MotionSettings::PointToPoint(PointToPointSettings {
+            distance_mm,
+            max_velocity_mm_s: 1.0,
+            max_acceleration_mm_s2: 100.0,
+            max_jerk_mm_s3: 1e4,
+        })
+    };
+    let sine = |stroke_mm: f64| {
+        MotionSettings::Harmonic(HarmonicSettings::with_velocity(
+            0.5 * stroke_mm,
+            1.0,
+            1.0,
+            0.1,
+        ))
+    };
+    for (from_mm, from_mm_s, stroke_mm, is_fed) in [
         (0.5, 0.0, 0.4, false),
         (0.5, 0.0, 4.0, true),
         (0.0, 1.1, 4.0, false),
         (0.0, 0.4, 4.0, true),
     ] {
-        let fed_v = friction_v(from_mm, from_mm_s, distance_mm);
-        let whole_v = friction_v(0.0, 0.0, distance_mm);
-        assert!(whole_v > 0.02, "{distance_mm} mm: {whole_v} V");
-        let what = format!("{distance_mm} mm, from {from_mm} mm, {from_mm_s} mm/s");
-        assert_eq!(fed_v, if is_fed { whole_v } else { 0.0 }, "{what}");
+        for motion in [moves(stroke_mm), sine(stroke_mm)] {
+            let fed_v = friction_v(from_mm, from_mm_s, motion);
+            let whole_v = friction_v(0.0, 0.0, motion);
+            assert!(whole_v > 0.02, "{motion:?}: {whole_v} V");
+            let what = format!("{motion:?}, from {from_mm} mm, {from_mm_s} mm/s");
+            assert_eq!(fed_v, if is_fed { whole_v } else { 0.0 }, "{what}");
+        }
     }
 }
 
