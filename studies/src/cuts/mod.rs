@@ -15,7 +15,7 @@ use quadrant_cli::warn;
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
-use quadrant_law::safety::{FaultCode, SafetyState};
+use quadrant_law::safety::SafetyState;
 use quadrant_settings::StageSettings;
 use quadrant_sim::identified_stage::identified_settings;
 use quadrant_sim::law_machine::Operator;
@@ -240,14 +240,14 @@ impl Case {
     /// Runs the case.
     ///
     /// # Errors
-    /// The fault that ended it, and its time in s.
+    /// The fault that ended it, and when; settings that are refused.
     fn run(
         &self,
         stage: &StageSettings,
         feedforward: Feedforward,
         cancels: bool,
         seed: u64,
-    ) -> Result<Run, (FaultCode, f64)> {
+    ) -> Result<Run, String> {
         let mut axis = stage.axes[0].clone();
         axis.feedback.law = self.law;
         feedforward.apply(&mut axis);
@@ -262,7 +262,7 @@ impl Case {
         let sine =
             HarmonicSettings::with_velocity(self.amplitude_mm, self.velocity_mm_s, cycles, LEAD_S);
         let mut machine = law_of(&axis, stage, MotionSettings::Harmonic(sine))
-            .expect("the settings of the repository");
+            .map_err(|error| error.to_string())?;
         let load = Load::Milling {
             cut: self.cut,
             component: self.component,
@@ -290,7 +290,7 @@ impl Case {
             let outputs = machine.tick(&TickInput::of_counts(counts, operator.request(tick)));
             let state = machine.state();
             if let SafetyState::Faulted(fault) = state.safety() {
-                return Err((fault.code, time_s));
+                return Err(format!("{} at {time_s:.1} s", fault.code.name()));
             }
             if state.is_running() {
                 let load_v = load.at_v(time_s);
@@ -455,8 +455,8 @@ pub fn judge(seed: u64, friction: TrueFriction, traces: Option<&Path>) -> Line {
     ]
     .map(|(name, feedforward, cancels)| {
         let run = case.run(&stage, feedforward, cancels, seed);
-        let run = run.unwrap_or_else(|(fault, time_s)| {
-            described += &format!("; {name}: {} at {time_s:.1} s", fault.name());
+        let run = run.unwrap_or_else(|ended| {
+            described += &format!("; {name}: {ended}");
             Run::default()
         });
         (name, run)

@@ -513,14 +513,15 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// [`Command::Run`], it tells the axis how long the strokes will be.
     pub fn run(&self, state: &mut AxisState<S, N>, motion: &Motion<S>) {
         self.handle_command(state, Command::Run);
-        state.oscillation.plan(motion.planned_stroke());
+        let planned = motion.planned_stroke();
+        self.oscillation.plan(&mut state.oscillation, planned);
     }
 
     /// Starts or ends a motion, from where the reference stands. Only what
     /// [`admission`](crate::admission::refusal) lets through may come here.
     pub fn handle_command(&self, state: &mut AxisState<S, N>, command: Command) {
         let (generator, here) = (&mut state.generator, state.look_ahead);
-        state.oscillation.plan(None);
+        self.oscillation.plan(&mut state.oscillation, None);
         match command {
             Command::Run | Command::StartMove(_) => self.generator.start_plan(generator, here),
             Command::Jog(_, velocity) => {
@@ -754,7 +755,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         };
         if changed {
             self.feedforward.go_on(&mut state.friction, step.velocity);
-            self.oscillation.restart(&mut state.oscillation);
+            self.oscillation.forget(&mut state.oscillation);
         }
         seen.feedforward = self.feedforward.step(&mut state.friction, step);
         let mut total = seen.feedforward.total();
@@ -934,6 +935,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// Opens the loop of an axis at rest.
     pub(crate) fn open_loop(&self, state: &mut AxisState<S, N>) {
         state.plausibility.forget_standstill();
+        self.oscillation.plan(&mut state.oscillation, None);
         self.generator.open_loop(&mut state.generator);
     }
 
@@ -959,7 +961,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     fn forget_learnt(&self, state: &mut AxisState<S, N>) {
         state.learning = LearningState::default();
         self.cancelling.start(&mut state.cancelling);
-        self.oscillation.restart(&mut state.oscillation);
+        self.oscillation.forget(&mut state.oscillation);
     }
 
     /// Shows an axis whose outputs are off. `changed` says that the settings are new in this tick.

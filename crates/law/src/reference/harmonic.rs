@@ -268,11 +268,11 @@ impl<S: Scalar> Harmonic<S> {
         }
     }
 
-    /// True if the motion has an end.
     pub(super) const fn stroke(&self) -> PlannedStroke {
         self.stroke
     }
 
+    /// True if the motion has an end.
     pub(super) const fn ends(&self) -> bool {
         self.end_tick != NEVER
     }

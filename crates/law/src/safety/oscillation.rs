@@ -12,7 +12,7 @@
 //! - **Slow or short motions**, where the settings say that friction fed forward does harm there: it fades within 50 ms by the largest speed
 //!   of the reference in this stroke and the one before, and by the longer one of both, so that a reversal of a fast or long motion still
 //!   has all of it. After a second at rest, a motion is slow until it is fast, and long until it turns. Of a move or a sine of the plan, both
-//!   are known from the start. Before the first motion, none is fed forward.
+//!   are known from the start. From enabling to the first motion, none is fed forward.
 //! - **Hum.** At rest, the error swings evenly at 20 Hz or more for a second. It is reported, and nothing is done.
 //! - **Instability.** The error swings evenly for a second, each time by more than a limit and by more than twice the distance
 //!   that the reference goes meanwhile. That is a fault.
@@ -313,13 +313,23 @@ impl<S: Scalar> Oscillation<S> {
         }
     }
 
-    /// Forgets everything but what has been reported: the settings have changed, or the outputs are off. Where friction fed forward fades, there
-    /// is none until a motion shows that it is to be.
+    /// Forgets everything but what has been reported: the outputs are off. Where friction fed forward fades, there is none until a motion
+    /// shows that it is to be.
     pub(crate) fn restart(&self, state: &mut OscillationState) {
-        let fades = self.slow.from | self.short.from > 0;
         *state = OscillationState {
             reading: state.reading,
-            faded: if fades { REDUCTION_STEPS } else { 0 },
+            faded: if self.fades() { REDUCTION_STEPS } else { 0 },
+            ..OscillationState::default()
+        };
+    }
+
+    /// Forgets what was found under other settings; the motion under way goes on.
+    pub(crate) fn forget(&self, state: &mut OscillationState) {
+        *state = OscillationState {
+            reading: state.reading,
+            faded: if self.fades() { state.faded } else { 0 },
+            planned: state.planned,
+            pace: state.pace,
             ..OscillationState::default()
         };
     }
@@ -335,6 +345,9 @@ impl<S: Scalar> Oscillation<S> {
     /// Looks at the axis; returns false if it is not stable.
     #[inline(never)]
     pub fn step(&self, state: &mut OscillationState, input: OscillationInput) -> bool {
+        if self.fades() {
+            self.fade(state, input);
+        }
         if input.excited {
             state.stroke = Stroke::default();
             state.stroke_before = Stroke::default();
@@ -350,9 +363,6 @@ impl<S: Scalar> Oscillation<S> {
         let reference = input.reference as i32;
         if self.feeds_friction {
             self.follow(state, error, reference, input.sense);
-            if self.slow.from | self.short.from > 0 {
-                self.fade(state, reference, input.sense, input.speed);
-            }
         }
         self.count(state, error, reference, input.sense != 0)
     }
@@ -360,7 +370,9 @@ impl<S: Scalar> Oscillation<S> {
     /// Fades the friction feedforward by the largest speed, and by the way, in this stroke and the one before; at rest it stays.
     #[cold]
     #[inline(never)]
-    fn fade(&self, state: &mut OscillationState, reference: i32, sense: i8, speed: u32) {
+    fn fade(&self, state: &mut OscillationState, input: OscillationInput) {
+        let OscillationInput { sense, speed, .. } = input;
+        let reference = input.reference as i32;
         let pace = &mut state.pace;
         if sense == 0 {
             pace.rested = pace.rested.saturating_add(1);
@@ -386,13 +398,36 @@ impl<S: Scalar> Oscillation<S> {
         }
         pace.most = pace.most.max(speed);
         pace.way = reference.wrapping_sub(pace.from).unsigned_abs();
-        let slow = self.slow.steps(pace.most.max(pace.most_before));
-        let short = self.short.steps(pace.way.max(pace.way_before));
+        let most = pace.most.max(pace.most_before);
+        let wanted = self.steps(most, pace.way.max(pace.way_before));
         let (least, most) = (
             state.faded.saturating_sub(self.steps_per_look),
             state.faded.saturating_add(self.steps_per_look),
         );
-        state.faded = slow.max(short).clamp(least, most);
+        state.faded = wanted.max(least).min(most);
+    }
+
+    /// Steps by which the friction feedforward is reduced on strokes of a speed, 2^-16 counts a tick, and a length, counts.
+    fn steps(&self, speed: u32, counts: u32) -> u8 {
+        self.slow.steps(speed).max(self.short.steps(counts))
+    }
+
+    /// True if there are motions on which less friction is fed forward.
+    #[inline(always)]
+    fn fades(&self) -> bool {
+        self.feeds_friction & (self.slow.from | self.short.from > 0)
+    }
+
+    /// Takes the strokes of the motion that begins, if they are known. Of the first one after enabling, no friction acts yet that could fade.
+    pub fn plan(&self, state: &mut OscillationState, planned: Option<PlannedStroke>) {
+        state.planned = planned;
+        let Some(planned) = planned else {
+            return;
+        };
+        if self.fades() && state.pace.most == 0 {
+            state.faded = self.steps(planned.speed, planned.counts);
+        }
+        state.pace.sense = 0;
     }
 
     /// Follows the strokes of the reference, and reduces or restores the friction feedforward.
@@ -588,11 +623,6 @@ impl OscillationState {
     /// The oscillation that was found last.
     pub fn reading(&self) -> OscillationReading {
         self.reading
-    }
-
-    /// Takes the strokes of the motion that begins, if they are known.
-    pub fn plan(&mut self, planned: Option<PlannedStroke>) {
-        self.planned = planned;
     }
 
     fn enter(&mut self, phase: Phase) {

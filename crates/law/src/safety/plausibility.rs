@@ -5,7 +5,7 @@
 //! output through a lag of the plant's dead time. Three comparisons:
 //!
 //! - **No motion.** While the encoder stands (or dithers between two counts, as with one dead line), the voltage may
-//!   change by what friction takes up before it yields visibly. What goes beyond moves a model, `v' = A u - B v`, from
+//!   change by what friction takes up before it yields visibly, or fall by what friction gives up as it eases under a vibration. What goes beyond moves a model, `v' = A u - B v`, from
 //!   rest; when that has gone farther than a distance, the encoder is dead or the axis is blocked. The change counts from
 //!   the last motion that was seen, because a load may be held at rest with any voltage; and in the sense in which the axis
 //!   last slid, from the voltage at which it slid, beyond which friction takes up little more. In open loop nothing is held, so
@@ -535,7 +535,7 @@ impl Plausibility {
     /// much as there was, since under a vibration it eases without a motion.
     #[inline(always)]
     fn beyond_held(&self, state: &PlausibilityState) -> i32 {
-        let eased = state.anchor.clamp(-self.eased, self.eased);
+        let eased = state.anchor.max(-self.eased).min(self.eased);
         let change = state.force.saturating_sub(state.anchor);
         let forth = self.held.max(-eased);
         let back = self.held.max(eased);

@@ -5,7 +5,9 @@ use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::learning::LearningSettings;
-use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
+use quadrant_law::reference::{
+    HarmonicSettings, MotionSettings, PlannedStroke, PointToPointSettings,
+};
 use quadrant_law::safety::FaultCode;
 use quadrant_law::safety::oscillation::{
     Oscillation, OscillationInput, OscillationKind, OscillationReading, OscillationState,
@@ -543,6 +545,30 @@ fn friction_is_fed_forward_on_strokes_beyond_a_length_and_on_the_first_one_after
 }
 
 #[test]
+fn a_planned_move_is_a_stroke_of_its_own_however_short_the_rest_before_it() {
+    let mut shown = Shown {
+        monitor: Oscillation::new(true, 1e6, 1e-4).feeding_beyond(100.0),
+        state: OscillationState::default(),
+        forth: false,
+        speed: 1,
+    };
+    shown.strokes(1, 1000, 10);
+    assert_eq!(shown.acts(), 1.0);
+    for (counts, way, share) in [(20, 20, 0.0), (20, 20, 0.0), (4000, 20, 1.0), (20, 20, 0.0)] {
+        for _ in 0..750 {
+            shown.monitor.step(&mut shown.state, AT_REST);
+        }
+        shown
+            .monitor
+            .plan(&mut shown.state, Some(PlannedStroke { counts, speed: 1 }));
+        // In the sense of the one before.
+        shown.forth = false;
+        shown.strokes(1, way, 10);
+        assert_eq!(shown.acts(), share, "{counts} counts");
+    }
+}
+
+#[test]
 fn a_move_or_sine_of_the_plan_is_known_to_be_short_or_slow_before_it_begins() {
     /// The largest friction that is fed forward in the first tenth of a second of a motion, V.
     fn friction_v(from_mm: f64, from_mm_s: f64, motion: MotionSettings) -> f64 {
@@ -577,7 +603,7 @@ fn a_move_or_sine_of_the_plan_is_known_to_be_short_or_slow_before_it_begins() {
             0.5 * stroke_mm,
             1.0,
             1.0,
-            0.1,
+            0.4,
         ))
     };
     for (from_mm, from_mm_s, stroke_mm, is_fed) in [

@@ -237,8 +237,8 @@ fn an_encoder_that_stands_is_found_when_the_model_has_gone_the_distance() {
 #[test]
 fn a_force_that_falls_towards_zero_while_an_axis_stands_is_friction_that_eases() {
     const STOPS_S: f64 = 0.5;
-    const FALLS_V_PER_S: f64 = 2.0;
-    for eased_v in [0.0, 1.5] {
+    // Friction that eases takes nothing up of a force that rises.
+    for (eased_v, falls_v_per_s) in [(0.0, 2.0), (1.5, 2.0), (1.5, -2.0)] {
         let model = PlausibilityModel {
             eased_v,
             load_v: NEVER_V,
@@ -252,7 +252,7 @@ fn a_force_that_falls_towards_zero_while_an_axis_stands_is_friction_that_eases()
         {
             let axis = Plausibility::new(&model, words, COUNT_MM, PERIOD_S);
             let volts = |time_s: f64| {
-                let fallen_v = FALLS_V_PER_S * (time_s - STOPS_S).max(0.0);
+                let fallen_v = falls_v_per_s * (time_s - STOPS_S).max(0.0);
                 level_v - fallen_v * level_v.signum()
             };
             // One that a load holds moves on whatever its voltage is.
@@ -263,16 +263,22 @@ fn a_force_that_falls_towards_zero_while_an_axis_stands_is_friction_that_eases()
                 if now_s < STOPS_S {
                     return false;
                 }
-                let taken = model.held_v.max(eased_v.min(level_v.abs()));
                 let fallen = (level_v - force) * level_v.signum();
-                velocity += (model.gain_mm_per_v_s2 * (fallen - taken).max(0.0)
+                // All of 1.2 V, and 1.5 V of 2.5.
+                let taken = match (eased_v > 0.0 && fallen > 0.0, level_v.abs() > 2.0) {
+                    (false, _) => model.held_v,
+                    (true, false) => 1.2,
+                    (true, true) => 1.5,
+                };
+                velocity += (model.gain_mm_per_v_s2 * (fallen.abs() - taken).max(0.0)
                     - model.damping_per_s * velocity)
                     * INTERVAL_S;
                 distance += velocity * INTERVAL_S - distance * INTERVAL_S / FORGET_S;
                 distance > model.distance_mm
             });
             let seen = time_until_found(&axis, words, false, volts, creeps);
-            near(&format!("{words:?}, {level_v} V, {eased_v} V"), seen, found);
+            let what = format!("{words:?}, {level_v} V, {eased_v} V, {falls_v_per_s} V/s");
+            near(&what, seen, found);
         }
     }
 }
