@@ -510,7 +510,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     }
 
     /// Starts the motion of the plan, which the axis will be given in every tick, from where the reference stands. Unlike
-    /// [`Command::Run`], it tells the axis how long the strokes will be.
+    /// [`Command::Run`], it gives the axis the length and the speed of the strokes.
     pub fn run(&self, state: &mut AxisState<S, N>, motion: &Motion<S>) {
         self.handle_command(state, Command::Run);
         let planned = motion.planned_stroke();

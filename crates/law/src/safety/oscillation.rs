@@ -399,12 +399,12 @@ impl<S: Scalar> Oscillation<S> {
         pace.most = pace.most.max(speed);
         pace.way = reference.wrapping_sub(pace.from).unsigned_abs();
         let most = pace.most.max(pace.most_before);
-        let wanted = self.steps(most, pace.way.max(pace.way_before));
+        let target = self.steps(most, pace.way.max(pace.way_before));
         let (least, most) = (
             state.faded.saturating_sub(self.steps_per_look),
             state.faded.saturating_add(self.steps_per_look),
         );
-        state.faded = wanted.max(least).min(most);
+        state.faded = target.max(least).min(most);
     }
 
     /// Steps by which the friction feedforward is reduced on strokes of a speed, 2^-16 counts a tick, and a length, counts.
