@@ -29,6 +29,8 @@ enum Activity {
     Jog(f64),
     /// The encoder is dead before the jog begins.
     JogFromRest(f64),
+    /// The axis hangs with a load, V, has gone upwards, and stands; the encoder is dead before it jogs down at this speed.
+    Lowering(f64, f64),
     Sine(f64),
     /// The same under a cut, Hz.
     CutSine(f64, f64),
@@ -42,7 +44,7 @@ enum Activity {
     ClosedLoop(f64, f64),
 }
 
-const ACTIVITIES: [Activity; 19] = [
+const ACTIVITIES: [Activity; 22] = [
     Activity::Rest,
     Activity::RestUnderLoad,
     Activity::Jog(1.0),
@@ -52,6 +54,9 @@ const ACTIVITIES: [Activity; 19] = [
     Activity::JogFromRest(1.0),
     Activity::JogFromRest(10.0),
     Activity::JogFromRest(100.0),
+    Activity::Lowering(0.1, 1.0),
+    Activity::Lowering(0.1, 10.0),
+    Activity::Lowering(0.3, 10.0),
     Activity::Sine(30.0),
     Activity::Move,
     Activity::Homing,
@@ -106,6 +111,16 @@ const CUTS_HZ: [f64; 4] = [10.0, 20.0, 35.0, 100.0];
 /// Ticks before the activity begins.
 const BEFORE: u32 = 50;
 
+/// Speed at which a hanging axis is raised, mm/s, and the ticks in which it stops, and in which it begins to be lowered.
+const RAISING_MM_S: f64 = 10.0;
+const RAISED: u32 = 3000;
+const LOWERED: u32 = 6000;
+
+fn jog(velocity_mm_s: f64) -> Command {
+    let scale = StageSettings::simulated().motion_scale(0);
+    Command::Jog(AxisName::X, Velocity::from_mm_s(velocity_mm_s, scale))
+}
+
 impl<S: Scalar> Bench<S> {
     fn new(
         settings: &StageSettings,
@@ -133,10 +148,8 @@ impl<S: Scalar> Bench<S> {
         let scale = StageSettings::simulated().motion_scale(0);
         match self.activity {
             Activity::Rest | Activity::RestUnderLoad => None,
-            Activity::Jog(velocity) | Activity::JogFromRest(velocity) => Some(Command::Jog(
-                AxisName::X,
-                Velocity::from_mm_s(velocity, scale),
-            )),
+            Activity::Jog(velocity) | Activity::JogFromRest(velocity) => Some(jog(velocity)),
+            Activity::Lowering(..) => Some(jog(RAISING_MM_S)),
             Activity::Sine(_) | Activity::CutSine(..) | Activity::Move => Some(Command::Run),
             Activity::Homing => Some(Command::Home(AxisName::X)),
             Activity::Stream => {
@@ -244,6 +257,14 @@ impl<S: Scalar> Bench<S> {
         if self.ticks > BEFORE {
             self.feed();
         }
+        if let Activity::Lowering(load_v, velocity) = self.activity {
+            self.plant.load_v = -load_v;
+            match self.ticks {
+                RAISED => self.rig.inputs.command = Some(jog(0.0)),
+                LOWERED => self.rig.inputs.command = Some(jog(-velocity)),
+                _ => {}
+            }
+        }
         if self.activity == Activity::RestUnderLoad {
             self.plant.load_v = if self.ticks / 2000 % 2 == 1 { 0.5 } else { 0.0 };
         }
@@ -286,6 +307,7 @@ struct End {
 fn run_until_off(settings: &StageSettings, truth: &Truth, activity: Activity, death: Death) -> End {
     let at = match activity {
         Activity::JogFromRest(_) => BEFORE - 10,
+        Activity::Lowering(..) => LOWERED - 10,
         Activity::Jog(velocity) if velocity > 100.0 => 3000,
         Activity::Homing => 1000,
         Activity::Move => 2500,
@@ -346,7 +368,10 @@ fn is_unseen(activity: Activity, death: Death) -> bool {
         // What a load does to an axis that stands is seen by the encoder alone.
         (_, Activity::RestUnderLoad) => death != Death::Reversed,
         // It is slower than its gaps; the index pulses show it.
-        (Death::Intermittent, Activity::Jog(speed) | Activity::JogFromRest(speed)) => speed <= 10.0,
+        (
+            Death::Intermittent,
+            Activity::Jog(speed) | Activity::JogFromRest(speed) | Activity::Lowering(_, speed),
+        ) => speed <= 10.0,
         // A cut is a load that comes and goes in the gaps.
         (Death::Intermittent, Activity::CutSine(..)) => true,
         (Death::Intermittent, Activity::OpenLoop(volts, _) | Activity::ClosedLoop(volts, _)) => {
