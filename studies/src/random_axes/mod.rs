@@ -8,6 +8,7 @@ mod healthy;
 mod motion;
 mod page;
 mod plant;
+mod program;
 mod subject;
 mod summary;
 
@@ -537,7 +538,7 @@ impl Line {
                     .zip(&errors_mm)
                     .filter(|(_, errors)| errors.is_worse())
                     .collect();
-                let moves = |(motion, _): &(&Motion, &Compared)| matches!(motion, Motion::Moves(_));
+                let moves = |(motion, _): &(&Motion, &Compared)| motion.is_moves();
                 self.outcome = if worse.is_empty() {
                     Outcome::Commissioned
                 } else if worse.iter().all(moves) {
@@ -682,13 +683,7 @@ fn largest(
     let parameters = subject
         .warmed(used_s)
         .unwrap_or_else(|| subject.parameters.clone());
-    let travel_mm = subject.travel.half_mm();
-    let mut axis = SimulatedTestAxis::new(0, parameters, !subject.seed ^ (noise << 32))
-        .with_travel_mm(travel_mm);
-    axis.apply(settings).map_err(|error| error.to_string())?;
-    motion
-        .run(&mut axis, travel_mm)
-        .map_err(|error| error.to_string())
+    motion.run(settings, parameters, subject, !subject.seed ^ (noise << 32))
 }
 
 #[cfg(test)]

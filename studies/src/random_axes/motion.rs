@@ -2,9 +2,14 @@
 
 use std::fmt;
 
+use quadrant_settings::AxisSettings;
+use quadrant_sim::plant::AxisParameters;
 use quadrant_sim::sine_test::SineTest;
 use quadrant_tune::commission::verify::{Cycles, Moves, run_cycles, run_moves};
-use quadrant_tune::test_axis::{ExperimentError, SimulatedTestAxis, approach};
+use quadrant_tune::test_axis::{ExperimentError, SimulatedTestAxis, TestAxis, approach};
+
+use super::program;
+use super::subject::Subject;
 
 /// A motion that results are judged on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,6 +17,8 @@ pub(super) enum Motion {
     Sine(SineTest, Cycles),
     /// Moves to and fro, with a rest after each.
     Moves(Moves),
+    /// The program of the axis.
+    Program,
 }
 
 /// The usual sines, mm and mm/s: none of them is a trial of the commissioning.
@@ -64,6 +71,7 @@ impl Motion {
             .iter()
             .map(sine)
             .chain(MOVES.iter().map(moves))
+            .chain([Self::Program])
             .collect()
     }
 
@@ -75,27 +83,43 @@ impl Motion {
         })
     }
 
-    /// Runs the law in force on it, within a travel: the largest error, mm.
+    /// Runs settings on an axis of a subject with some parameters: the largest error, mm. `seed` decides the noise.
     pub(super) fn run(
         self,
-        axis: &mut SimulatedTestAxis,
-        travel_mm: f64,
-    ) -> Result<f64, ExperimentError> {
-        approach(axis, 0.0)?;
+        settings: &AxisSettings,
+        parameters: AxisParameters,
+        subject: &Subject,
+        seed: u64,
+    ) -> Result<f64, String> {
+        let travel_mm = subject.travel.half_mm();
+        let on_an_axis = |run: &dyn Fn(&mut SimulatedTestAxis) -> Result<f64, ExperimentError>| {
+            let mut axis =
+                SimulatedTestAxis::new(0, parameters.clone(), seed).with_travel_mm(travel_mm);
+            axis.apply(settings).map_err(|error| error.to_string())?;
+            approach(&mut axis, 0.0)
+                .and_then(|()| run(&mut axis))
+                .map_err(|error| error.to_string())
+        };
         match self {
-            Self::Sine(sine, cycles) => {
+            Self::Sine(sine, cycles) => on_an_axis(&|axis| {
                 let fitted = sine.within(MOST_TRAVEL * travel_mm);
                 run_cycles(axis, "judging", fitted, cycles, &mut |_| {})
                     .map(|(score, _)| score.largest_mm)
-            }
-            Self::Moves(moves) => {
+            }),
+            Self::Moves(moves) => on_an_axis(&|axis| {
                 let fitted = Moves {
                     distance_mm: moves.distance_mm.min(MOST_TRAVEL * travel_mm),
                     ..moves
                 };
                 run_moves(axis, "judging", fitted, &mut |_| {})
-            }
+            }),
+            Self::Program => program::largest_mm(settings, parameters, subject, seed),
         }
+    }
+
+    /// True of moves, whether the axis knows their end or not.
+    pub(super) fn is_moves(self) -> bool {
+        matches!(self, Self::Moves(_) | Self::Program)
     }
 }
 
@@ -113,6 +137,7 @@ impl fmt::Display for Motion {
                 distance_mm,
                 velocity_mm_s,
             }) => write!(f, "moves of {distance_mm:.4} mm at {velocity_mm_s} mm/s"),
+            Self::Program => f.write_str("a program of moves"),
         }
     }
 }

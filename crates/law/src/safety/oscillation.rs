@@ -11,8 +11,8 @@
 //!   returns at once with a stroke more than twice as long, in which it need not harm.
 //! - **Slow or short motions**, where the settings say that friction fed forward does harm there: it fades within 50 ms by the largest speed
 //!   of the reference in this stroke and the one before, and by the longer one of both, so that a reversal of a fast or long motion still
-//!   has all of it. After a second at rest, a motion is slow until it is fast, and long until it turns. Of a move or a sine of the plan, both
-//!   are known from the start. From enabling to the first motion, none is fed forward.
+//!   has all of it. After a tenth of a second at rest, a motion is slow and short until it is fast and long. Of a move or a sine of the plan,
+//!   both are known from the start. From enabling to the first motion, none is fed forward.
 //! - **Hum.** At rest, the error swings evenly at 20 Hz or more for a second. It is reported, and nothing is done.
 //! - **Instability.** The error swings evenly for a second, each time by more than a limit and by more than twice the distance
 //!   that the reference goes meanwhile. That is a fault.
@@ -45,6 +45,9 @@ const TRIAL_S: f64 = 5.0;
 
 /// Window in which an oscillation is even, and time of rest before it counts as hum, s.
 const WINDOW_S: f64 = 1.0;
+
+/// Time for which the reference rests between two motions that have nothing to do with each other, s: at a reversal on a path it rests for less.
+const PAUSE_S: f64 = 0.1;
 
 /// Strokes one after the other at whose ends the error has swung too far, in them or from the one to the other.
 const BAD_STROKES: u8 = 3;
@@ -91,6 +94,7 @@ pub struct Oscillation<S: Scalar> {
     patience_looks: u32,
     trial_looks: u32,
     window_looks: u32,
+    pause_looks: u32,
     /// Swing that is a fault, counts; the largest number for none.
     unstable_counts: u32,
     /// Speed of strokes on which no friction is fed forward, 2^-16 counts a tick, and their length, counts.
@@ -282,6 +286,7 @@ impl<S: Scalar> Oscillation<S> {
             patience_looks: looks(PATIENCE_S),
             trial_looks: looks(TRIAL_S),
             window_looks: looks(WINDOW_S),
+            pause_looks: looks(PAUSE_S),
             unstable_counts: rounding::round(unstable_counts) as u32,
             slow: Fading::default(),
             short: Fading::default(),
@@ -376,7 +381,7 @@ impl<S: Scalar> Oscillation<S> {
         let pace = &mut state.pace;
         if sense == 0 {
             pace.rested = pace.rested.saturating_add(1);
-            if pace.rested >= self.window_looks {
+            if pace.rested >= self.pause_looks {
                 pace.sense = 0;
             }
             return;
@@ -386,14 +391,11 @@ impl<S: Scalar> Oscillation<S> {
             let after_rest = pace.sense == 0;
             pace.sense = sense;
             pace.from = reference;
-            (pace.most_before, pace.way_before) = if after_rest {
-                (0, u32::MAX)
-            } else {
-                (pace.most, pace.way)
+            (pace.most_before, pace.way_before) = match state.planned {
+                Some(planned) => (planned.speed, planned.counts),
+                None if after_rest => (0, 0),
+                None => (pace.most, pace.way),
             };
-            if let Some(planned) = state.planned {
-                (pace.most_before, pace.way_before) = (planned.speed, planned.counts);
-            }
             (pace.most, pace.way) = (0, 0);
         }
         pace.most = pace.most.max(speed);

@@ -404,9 +404,9 @@ impl Shown {
         }
     }
 
-    /// Two seconds at rest.
-    fn rest(&mut self) {
-        for _ in 0..2 * 2500 {
+    /// A time at rest, s.
+    fn rest(&mut self, seconds: f64) {
+        for _ in 0..(2500.0 * seconds) as usize {
             self.monitor.step(&mut self.state, AT_REST);
         }
     }
@@ -488,9 +488,9 @@ fn friction_is_fed_forward_by_the_fastest_of_two_strokes_and_stays_as_it_is_at_r
     shown.strokes(1, 80, 10);
     assert!((shown.acts() - 0.5).abs() < 0.02, "{}", shown.acts());
     let half = shown.acts();
-    shown.rest();
+    shown.rest(2.0);
     assert_eq!(shown.acts(), half, "at rest");
-    // After a second at rest, what went before does not count.
+    // After a rest, what went before does not count.
     shown.speed = counts(100);
     shown.strokes(1, 80, 10);
     assert_eq!(shown.acts(), 0.0);
@@ -523,7 +523,7 @@ fn an_axis_whose_settings_say_nothing_of_slow_motions_feeds_friction_forward_on_
 }
 
 #[test]
-fn friction_is_fed_forward_on_strokes_beyond_a_length_and_on_the_first_one_after_a_rest() {
+fn friction_is_fed_forward_on_strokes_beyond_a_length_and_after_a_rest_once_one_is_as_long() {
     // Nothing up to 100 counts, all from 200 on.
     let mut shown = Shown {
         monitor: Oscillation::new(true, 1e6, 1e-4).feeding_beyond(100.0),
@@ -531,17 +531,20 @@ fn friction_is_fed_forward_on_strokes_beyond_a_length_and_on_the_first_one_after
         forth: false,
         speed: 1,
     };
-    for (way, share) in [(80, 1.0), (80, 0.0), (1000, 1.0), (80, 1.0), (80, 0.0)] {
+    for (way, share) in [(80, 0.0), (1000, 1.0), (80, 1.0), (80, 0.0)] {
         shown.strokes(1, way, 10);
         assert_eq!(shown.acts(), share, "{way}");
     }
     shown.strokes(2, 150, 10);
     assert!((shown.acts() - 0.5).abs() < 0.03, "{}", shown.acts());
-    shown.strokes(2, 80, 10);
-    shown.rest();
-    // Nobody knows how long it will be.
-    shown.strokes(1, 80, 10);
-    assert_eq!(shown.acts(), 1.0, "from rest");
+    // A reversal on a path rests for less than 0.1 s.
+    for (rest_s, share) in [(0.09, 1.0), (0.11, 0.0)] {
+        shown.strokes(1, 1000, 10);
+        assert_eq!(shown.acts(), 1.0);
+        shown.rest(rest_s);
+        shown.strokes(1, 80, 10);
+        assert_eq!(shown.acts(), share, "after {rest_s} s");
+    }
 }
 
 #[test]
@@ -555,9 +558,7 @@ fn a_planned_move_is_a_stroke_of_its_own_however_short_the_rest_before_it() {
     shown.strokes(1, 1000, 10);
     assert_eq!(shown.acts(), 1.0);
     for (counts, way, share) in [(20, 20, 0.0), (20, 20, 0.0), (4000, 20, 1.0), (20, 20, 0.0)] {
-        for _ in 0..750 {
-            shown.monitor.step(&mut shown.state, AT_REST);
-        }
+        shown.rest(0.05);
         shown
             .monitor
             .plan(&mut shown.state, Some(PlannedStroke { counts, speed: 1 }));
