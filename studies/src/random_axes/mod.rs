@@ -142,11 +142,11 @@ pub enum Outcome {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     pub outcome: Outcome,
-    /// Largest error over that of the PID: the worst of the judging sines.
+    /// Largest error over that of the PID: the worst of the usual motions.
     pub worst_ratio: Option<f64>,
     /// Largest error over that of the PID: the geometric mean.
     pub mean_ratio: Option<f64>,
-    /// The PID's largest error of all judging sines, um.
+    /// The PID's largest error of all usual motions, um.
     pub pid_um: Option<f64>,
     pub small: Small,
     pub health: Health,

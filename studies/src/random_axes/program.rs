@@ -1,4 +1,4 @@
-//! A program of moves of every length, given from elsewhere: as LinuxCNC gives it, the law does not know where a move will end.
+//! A program of moves of every length, given from elsewhere: as with LinuxCNC, the law does not know where a move will end.
 
 use std::iter;
 
@@ -24,7 +24,7 @@ const LONGEST_S: f64 = 4.0;
 const RESTS_S: [f64; 4] = [0.0, 0.02, 0.2, 1.5];
 /// Rest before the first move, s.
 const BEFORE_S: f64 = 0.3;
-/// Largest distance from the middle over the travel.
+/// Largest distance from the middle over the travel; the longest move is one, too.
 const MOST_TRAVEL: f64 = 0.4;
 /// Largest acceleration, mm/s².
 const MOST_MM_S2: f64 = 400.0;

@@ -821,7 +821,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             return;
         };
         // What friction that is not fed forward took over would be lost.
-        if state.oscillation.is_reduced() {
+        if self.oscillation.may_fade(&state.oscillation) {
             return;
         }
         if self.learns {

@@ -46,7 +46,7 @@ const TRIAL_S: f64 = 5.0;
 /// Window in which an oscillation is even, and time of rest before it counts as hum, s.
 const WINDOW_S: f64 = 1.0;
 
-/// Time for which the reference rests between two motions that have nothing to do with each other, s: at a reversal on a path it rests for less.
+/// Time at rest after which a motion has nothing to do with the one before, s.
 const PAUSE_S: f64 = 0.1;
 
 /// Strokes one after the other at whose ends the error has swung too far, in them or from the one to the other.
@@ -203,7 +203,7 @@ pub struct OscillationState {
 /// Largest speeds of the reference, 2^-16 counts a tick, and its ways, counts: in this stroke and the one before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Pace {
-    /// Sense of the stroke; 0 after a rest.
+    /// Sense of the stroke; 0 until there is one.
     sense: i8,
     most: u32,
     most_before: u32,
@@ -347,6 +347,15 @@ impl<S: Scalar> Oscillation<S> {
         )
     }
 
+    /// True while less than all of the friction feedforward acts, and of a motion that begins now in which less may.
+    pub fn may_fade(&self, state: &OscillationState) -> bool {
+        let fades = match state.planned {
+            Some(planned) => self.steps(planned.speed, planned.counts) > 0,
+            None => state.pace.rested >= self.pause_looks,
+        };
+        state.is_reduced() | (self.fades() & fades)
+    }
+
     /// Looks at the axis; returns false if it is not stable.
     #[inline(never)]
     pub fn step(&self, state: &mut OscillationState, input: OscillationInput) -> bool {
@@ -381,21 +390,18 @@ impl<S: Scalar> Oscillation<S> {
         let pace = &mut state.pace;
         if sense == 0 {
             pace.rested = pace.rested.saturating_add(1);
-            if pace.rested >= self.pause_looks {
-                pace.sense = 0;
-            }
             return;
         }
-        pace.rested = 0;
-        if sense != pace.sense {
-            let after_rest = pace.sense == 0;
-            pace.sense = sense;
-            pace.from = reference;
+        let rested = core::mem::take(&mut pace.rested);
+        let paused = rested >= self.pause_looks;
+        if (sense != pace.sense) | paused {
             (pace.most_before, pace.way_before) = match state.planned {
                 Some(planned) => (planned.speed, planned.counts),
-                None if after_rest => (0, 0),
+                None if paused => (0, 0),
                 None => (pace.most, pace.way),
             };
+            pace.sense = sense;
+            pace.from = reference;
             (pace.most, pace.way) = (0, 0);
         }
         pace.most = pace.most.max(speed);

@@ -548,6 +548,27 @@ fn friction_is_fed_forward_on_strokes_beyond_a_length_and_after_a_rest_once_one_
 }
 
 #[test]
+fn a_motion_that_may_be_short_takes_nothing_over_from_the_integral() {
+    let mut shown = Shown {
+        monitor: Oscillation::new(true, 1e6, 1e-4).feeding_beyond(100.0),
+        state: OscillationState::default(),
+        forth: false,
+        speed: 1,
+    };
+    shown.strokes(1, 1000, 10);
+    assert!(!shown.monitor.may_fade(&shown.state));
+    shown.rest(0.11);
+    assert!(shown.monitor.may_fade(&shown.state));
+    for (counts, may) in [(1000, false), (50, true)] {
+        let planned = Some(PlannedStroke { counts, speed: 1 });
+        shown.monitor.plan(&mut shown.state, planned);
+        assert_eq!(shown.monitor.may_fade(&shown.state), may, "{counts}");
+    }
+    let always = Oscillation::<f64>::new(true, 1e6, 1e-4);
+    assert!(!always.may_fade(&OscillationState::default()));
+}
+
+#[test]
 fn a_planned_move_is_a_stroke_of_its_own_however_short_the_rest_before_it() {
     let mut shown = Shown {
         monitor: Oscillation::new(true, 1e6, 1e-4).feeding_beyond(100.0),

@@ -27,9 +27,8 @@ const STRENGTHS: [f64; 4] = [1.0, -1.0, 0.67, -0.67];
 /// Shares of a knock's duration and of its voltage beyond friction, until one does not throw the axis beyond its limits: a light one on a
 /// short travel may not be as fast as the whole makes it.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
-/// Largest RMS deviation of an axis that is at rest, counts, beside the encoder's noise: less than one, since it is not the same after each
-/// knock.
-const STILL_COUNTS: f64 = 0.8;
+/// Largest RMS deviation of an axis that is at rest, counts, beside the encoder's noise.
+const STILL_COUNTS: f64 = 1.0;
 /// RMS deviation from which on a softer loop is worth its larger errors, counts.
 const LOUD_COUNTS: f64 = 3.0;
 /// Factor on the encoder's noise that a loop may make of it.
