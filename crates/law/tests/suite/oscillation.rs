@@ -387,6 +387,16 @@ impl Shown {
         shown
     }
 
+    /// Nothing up to 100 counts, all from 200 on.
+    fn feeding_beyond_100_counts() -> Self {
+        Self {
+            monitor: Oscillation::new(true, 1e6, 1e-4).feeding_beyond(100.0),
+            state: OscillationState::default(),
+            forth: false,
+            speed: 1,
+        }
+    }
+
     fn strokes(&mut self, count: usize, way: i64, swing: i64) {
         for _ in 0..count {
             self.forth = !self.forth;
@@ -524,13 +534,7 @@ fn an_axis_whose_settings_say_nothing_of_slow_motions_feeds_friction_forward_on_
 
 #[test]
 fn friction_is_fed_forward_on_strokes_beyond_a_length_and_after_a_rest_once_one_is_as_long() {
-    // Nothing up to 100 counts, all from 200 on.
-    let mut shown = Shown {
-        monitor: Oscillation::new(true, 1e6, 1e-4).feeding_beyond(100.0),
-        state: OscillationState::default(),
-        forth: false,
-        speed: 1,
-    };
+    let mut shown = Shown::feeding_beyond_100_counts();
     for (way, share) in [(80, 0.0), (1000, 1.0), (80, 1.0), (80, 0.0)] {
         shown.strokes(1, way, 10);
         assert_eq!(shown.acts(), share, "{way}");
@@ -549,12 +553,7 @@ fn friction_is_fed_forward_on_strokes_beyond_a_length_and_after_a_rest_once_one_
 
 #[test]
 fn a_motion_that_may_be_short_takes_nothing_over_from_the_integral() {
-    let mut shown = Shown {
-        monitor: Oscillation::new(true, 1e6, 1e-4).feeding_beyond(100.0),
-        state: OscillationState::default(),
-        forth: false,
-        speed: 1,
-    };
+    let mut shown = Shown::feeding_beyond_100_counts();
     shown.strokes(1, 1000, 10);
     assert!(!shown.monitor.may_fade(&shown.state));
     shown.rest(0.11);
@@ -570,12 +569,7 @@ fn a_motion_that_may_be_short_takes_nothing_over_from_the_integral() {
 
 #[test]
 fn a_planned_move_is_a_stroke_of_its_own_however_short_the_rest_before_it() {
-    let mut shown = Shown {
-        monitor: Oscillation::new(true, 1e6, 1e-4).feeding_beyond(100.0),
-        state: OscillationState::default(),
-        forth: false,
-        speed: 1,
-    };
+    let mut shown = Shown::feeding_beyond_100_counts();
     shown.strokes(1, 1000, 10);
     assert_eq!(shown.acts(), 1.0);
     for (counts, way, share) in [(20, 20, 0.0), (20, 20, 0.0), (4000, 20, 1.0), (20, 20, 0.0)] {
