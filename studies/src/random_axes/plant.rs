@@ -35,7 +35,7 @@ pub struct RandomAxis {
 }
 
 /// Uniform on a logarithmic scale.
-fn log_uniform(random: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
+pub(super) fn log_uniform(random: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
     low * (high / low).powf(random.random::<f64>())
 }
 

@@ -10,6 +10,7 @@ use quadrant_sim::plant::{AxisParameters, StageParameters};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::plant::log_uniform;
 use super::subject::Subject;
 
 /// Moves of the program.
@@ -52,10 +53,10 @@ impl Program {
         let mut program = Self::default();
         program.rest(BEFORE_S, scale);
         for _ in 0..MOVES {
-            let mut between = |low: f64, high: f64| low * (high / low).powf(random.random::<f64>());
-            let length_mm = between(LENGTHS_MM.0, most_mm);
+            let length_mm = log_uniform(&mut random, LENGTHS_MM.0, most_mm);
             let slowest_mm_s = VELOCITIES_MM_S.0.max(length_mm / LONGEST_S);
-            let max_velocity_mm_s = between(slowest_mm_s.min(fastest_mm_s), fastest_mm_s);
+            let max_velocity_mm_s =
+                log_uniform(&mut random, slowest_mm_s.min(fastest_mm_s), fastest_mm_s);
             let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
             let is_beyond = (program.here_mm() + sign * length_mm).abs() > most_mm;
             program.append(
