@@ -25,9 +25,18 @@ const SENTENCES: &[(&str, &str)] = &[
         "docs/tick.md",
         "| **all** | **{count: f32.total.mean}** | | |",
     ),
+    ("docs/tick.md", "| usual | {count: f32.total.max} |"),
     (
         "docs/tick.md",
-        "| **of any kind** | {count: f32, homing.total.max} |",
+        "| a stream | {count: f32, stream.total.max} |",
+    ),
+    (
+        "docs/tick.md",
+        "| homing | {count: f32, homing.total.max} |",
+    ),
+    (
+        "docs/tick.md",
+        "| **of any kind** (enabling) | {count: f32, enable.total.max} |",
     ),
     (
         "docs/tick.md",

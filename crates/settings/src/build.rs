@@ -41,6 +41,8 @@ const SILENT_FRICTIONS: f64 = 2.0;
 const HELD_FRICTIONS: f64 = 0.65;
 /// Friction that eases under a vibration while an axis stands, over breakaway.
 const EASED_FRICTIONS: f64 = 1.5;
+/// Largest share of breakaway that friction takes up once more after it eased.
+const REGAINED_FRICTIONS: f64 = 0.25;
 /// Friction of an axis that stands after it slid, over breakaway.
 const STUCK_FRICTIONS: f64 = 0.75;
 /// The same on an axis that slides.
@@ -292,7 +294,8 @@ impl AxisSettings {
         let breakaway_v = self.largest_breakaway_v();
         // Turned around, an axis goes twice as far along the branch of its virgin curve for twice the force (Masing).
         let seen_mm = HELD_COUNTS * resolution_mm;
-        let held_v = 2.0 * self.friction.gms.virgin_curve_v(0.5 * seen_mm, breakaway_v);
+        let held_v =
+            HELD_ERROR * 2.0 * self.friction.gms.virgin_curve_v(0.5 * seen_mm, breakaway_v);
         let least_load_v = FIRST_LOAD_FRICTIONS * breakaway_v;
         let delay_s = plant.delay_s;
         let gain = plant.gain_mm_per_v_s2;
@@ -306,8 +309,9 @@ impl AxisSettings {
             limit_v,
             // Beyond it, a step of the encoder is a jump.
             largest_mm_s: 2.0 * self.limits.max_velocity_mm_s,
-            held_v: (HELD_ERROR * held_v).max(HELD_FRICTIONS * breakaway_v),
+            held_v: held_v.max(HELD_FRICTIONS * breakaway_v),
             eased_v: EASED_FRICTIONS * breakaway_v,
+            regained_v: held_v.min(REGAINED_FRICTIONS * breakaway_v),
             stuck_v: STUCK_FRICTIONS * breakaway_v,
             sliding_v: SLIDING_FRICTIONS * breakaway_v,
             turned_v: TURNED_FRICTIONS * breakaway_v,

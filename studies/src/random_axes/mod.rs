@@ -65,6 +65,7 @@ impl Campaign for Axes {
         "worst_ratio",
         "mean_ratio",
         "pid_um",
+        "program_ratio",
         "small_worse",
         "small_ratio",
         "small_sine",
@@ -148,6 +149,8 @@ pub struct Line {
     pub mean_ratio: Option<f64>,
     /// The PID's largest error of all usual motions, um.
     pub pid_um: Option<f64>,
+    /// Largest error on the program of moves over that of the PID.
+    pub program_ratio: Option<f64>,
     pub small: Small,
     pub health: Health,
     /// Error over that of the PID, the worst of the trials by which the commissioning chose its law.
@@ -410,6 +413,7 @@ fn judged(subject: &Subject, path: Path, judging: Judging) -> Judged {
         worst_ratio: None,
         mean_ratio: None,
         pid_um: None,
+        program_ratio: None,
         small: Small::default(),
         health: Health::default(),
         trial_worst: None,
@@ -517,15 +521,18 @@ impl Line {
             }
             Ok(compared)
         };
-        let motions = Motion::usual();
+        let mut motions = Motion::usual();
+        let usual = motions.len();
+        motions.push(Motion::Program);
         let errors_mm: Result<Vec<Compared>, String> = motions.iter().copied().map(judge).collect();
         match errors_mm {
             Ok(errors_mm) => {
                 let ratios: Vec<f64> = errors_mm.iter().map(Compared::ratio).collect();
-                let (worst, mean) = worst_and_mean(&ratios);
+                let (worst, mean) = worst_and_mean(&ratios[..usual]);
                 self.worst_ratio = Some(worst);
                 self.mean_ratio = Some(mean);
-                let largest_mm = errors_mm.iter().map(|compared| middle(&compared.pid_mm));
+                self.program_ratio = ratios.last().copied();
+                let largest_mm = errors_mm[..usual].iter().map(|it| middle(&it.pid_mm));
                 self.pid_um = Some(1e3 * largest_mm.fold(0.0, f64::max));
                 let few_counts = Motion::of_few_counts(subject.parameters.resolution_mm);
                 if let Ok(errors) = judge(few_counts)

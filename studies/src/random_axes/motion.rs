@@ -71,7 +71,6 @@ impl Motion {
             .iter()
             .map(sine)
             .chain(MOVES.iter().map(moves))
-            .chain([Self::Program])
             .collect()
     }
 

@@ -27,6 +27,12 @@ pub(super) fn print(lines: &Lines<Line>) {
             100.0 * (median - 1.0)
         );
     }
+    if let Some(median) = median(lines.values().filter_map(|line| line.program_ratio)) {
+        say!(
+            "On the program of moves, median: {:+.1} %",
+            100.0 * (median - 1.0)
+        );
+    }
     let axis_min = || lines.values().map(|line| line.axis_min);
     let computed_s: f64 = lines.values().map(|line| line.computed_s).sum();
     say!(

@@ -45,8 +45,17 @@ fn feedforward_that_throws_a_small_slow_motion_is_not_chosen_and_less_of_it_is()
         let line = judge(seed, Judging::SmallToo);
         println!("{line:?}");
         assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
-        assert!(line.mean_ratio.unwrap() < 0.32, "{line:?}");
+        assert!(line.mean_ratio.unwrap() < 0.3, "{line:?}");
     });
+}
+
+/// Its spring is of 34 Hz: a quick move of 0.1 mm throws it, whatever is left out when slow.
+#[test]
+fn feedforward_that_throws_a_short_quick_move_is_left_out_on_strokes_as_short() {
+    let line = judge(23_015, Judging::Usual);
+    println!("{line:?}");
+    assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
+    assert!(line.mean_ratio.unwrap() < 0.4, "{line:?}");
 }
 
 #[test]
@@ -126,7 +135,7 @@ fn axes_whose_pid_oscillates_while_friction_holds_them_get_a_softer_one_and_are_
         println!("{line:?}");
         // A move of 0.02 mm is 2 % worse.
         assert!(line.worst_ratio.unwrap() < 1.03, "{line:?}");
-        assert!(line.mean_ratio.unwrap() < 0.32, "{line:?}");
+        assert!(line.mean_ratio.unwrap() < 0.3, "{line:?}");
     });
 }
 

@@ -56,6 +56,9 @@ const ALIVE_S: f64 = 0.025;
 /// none above, where it is over before what friction holds has changed.
 const SETTLING_S: f64 = 0.003;
 
+/// Time without a motion after which an axis rests if its reference does, s: longer than an encoder with gaps is silent.
+const RESTS_S: f64 = 0.05;
+
 /// Counts within which an encoder with one dead line dithers.
 const DITHER_COUNTS: u32 = 2;
 
@@ -111,6 +114,8 @@ pub struct PlausibilityModel {
     pub held_v: f64,
     /// The same of a change towards zero, as far as there was that much voltage when the axis came to rest, V.
     pub eased_v: f64,
+    /// The same of a voltage that fell to zero and beyond, on the other side, of an axis that rests, V.
+    pub regained_v: f64,
     /// What friction takes up while the axis stands, in the sense in which it last slid, beyond the voltage at which it slid, V.
     pub stuck_v: f64,
     /// The same while an axis that slides does not follow, V.
@@ -158,6 +163,7 @@ pub struct Plausibility {
     lag: i32,
     held: i32,
     eased: i32,
+    regained: i32,
     stuck: i32,
     sliding: i32,
     turned: i32,
@@ -175,6 +181,8 @@ pub struct Plausibility {
     alive_for: u32,
     /// Comparisons after a motion, while the reference stands, in which the force that stopped the axis comes through the lag.
     settling: u32,
+    /// Comparisons without a motion after which an axis rests if its reference does.
+    rests_after: u32,
     /// Share of a speed that is lost, 2^-32.
     drag: i32,
     /// Right shift from a distance to what is forgotten of it.
@@ -303,6 +311,7 @@ impl Plausibility {
             lag: share(interval_s / (model.delay_s + filter_s)),
             held: force(model.held_v),
             eased: force(model.eased_v),
+            regained: force(model.regained_v),
             stuck: force(model.stuck_v),
             sliding: force(model.sliding_v),
             turned: force(model.turned_v),
@@ -315,6 +324,7 @@ impl Plausibility {
             breakaway: force(model.breakaway_v),
             drag: share(model.damping_per_s * interval_s),
             settling: (filter_s / SETTLING_S) as u32,
+            rests_after: (RESTS_S / interval_s) as u32,
             forget_shift: whole_log2(FORGET_S / interval_s),
             distance: distance(model.distance_mm),
             first_load: force(model.first_load_v),
@@ -380,13 +390,16 @@ impl Plausibility {
         if self.modelled {
             state.force += part(pushed.saturating_sub(state.force), self.lag);
             let speed = shown.speed.wrapping_shl(self.shift);
+            let stands = (shown.reference == state.reference) & !shown.open;
+            let rests = stands & (state.silent >= self.rests_after);
+            let regained = if rests { self.regained } else { 0 };
             let follows = self.follows(state, counts, speed, shown);
             self.moves_along(state, counts, speed)
-                & self.stands(state, counts, shown.open)
+                & self.stands(state, counts, shown.open, regained)
                 & follows
         } else {
             state.force = pushed;
-            !shown.open | self.stands(state, counts, shown.open)
+            !shown.open | self.stands(state, counts, shown.open, 0)
         }
     }
 
@@ -532,19 +545,25 @@ impl Plausibility {
     }
 
     /// The change of the force since the axis stands, beyond what friction takes up of it; of one towards zero friction may take up as
-    /// much as there was, since under a vibration it eases without a motion.
+    /// much as there was, since under a vibration it eases without a motion, and then `regained`.
     #[inline(always)]
-    fn beyond_held(&self, state: &PlausibilityState) -> i32 {
+    fn beyond_held(&self, state: &PlausibilityState, regained: i32) -> i32 {
         let eased = state.anchor.max(-self.eased).min(self.eased);
         let change = state.force.saturating_sub(state.anchor);
-        let forth = self.held.max(-eased);
-        let back = self.held.max(eased);
+        let forth = self.held.max(regained - eased);
+        let back = self.held.max(regained + eased);
         change.saturating_sub(forth).max(0) + change.saturating_add(back).min(0)
     }
 
     /// False if the encoder stands though the axis must have moved.
     #[inline(always)]
-    fn stands(&self, state: &mut PlausibilityState, counts: i32, open: bool) -> bool {
+    fn stands(
+        &self,
+        state: &mut PlausibilityState,
+        counts: i32,
+        open: bool,
+        regained: i32,
+    ) -> bool {
         state.travelled = state.travelled.saturating_add(counts);
         if state.travelled.unsigned_abs() > DITHER_COUNTS {
             state.travelled = 0;
@@ -553,7 +572,7 @@ impl Plausibility {
             state.modelled = 0;
         } else {
             state.silent = state.silent.saturating_add(1);
-            let held = self.beyond_held(state);
+            let held = self.beyond_held(state, regained);
             let mut force = larger(held, self.beyond_sliding(state));
             if open && force == 0 {
                 let mut allowed = self.breakaway;

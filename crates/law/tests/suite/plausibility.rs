@@ -56,6 +56,7 @@ fn model() -> PlausibilityModel {
         largest_mm_s: 300.0,
         held_v: 0.6,
         eased_v: 0.0,
+        regained_v: 0.0,
         // Of no concern, but to those that set them.
         stuck_v: NEVER_V,
         sliding_v: NEVER_V,
@@ -241,6 +242,7 @@ fn a_force_that_falls_towards_zero_while_an_axis_stands_is_friction_that_eases()
     for (eased_v, falls_v_per_s) in [(0.0, 2.0), (1.5, 2.0), (1.5, -2.0)] {
         let model = PlausibilityModel {
             eased_v,
+            regained_v: 0.1,
             load_v: NEVER_V,
             first_load_v: NEVER_V,
             ..model()
@@ -264,11 +266,11 @@ fn a_force_that_falls_towards_zero_while_an_axis_stands_is_friction_that_eases()
                     return false;
                 }
                 let fallen = (level_v - force) * level_v.signum();
-                // All of 1.2 V, and 1.5 V of 2.5.
+                // All of 1.2 V, and 1.5 V of 2.5, and a little beyond.
                 let taken = match (eased_v > 0.0 && fallen > 0.0, level_v.abs() > 2.0) {
                     (false, _) => model.held_v,
-                    (true, false) => 1.2,
-                    (true, true) => 1.5,
+                    (true, false) => 1.2 + model.regained_v,
+                    (true, true) => 1.5 + model.regained_v,
                 };
                 velocity += (model.gain_mm_per_v_s2 * (fallen.abs() - taken).max(0.0)
                     - model.damping_per_s * velocity)
@@ -279,6 +281,28 @@ fn a_force_that_falls_towards_zero_while_an_axis_stands_is_friction_that_eases()
             let seen = time_until_found(&axis, words, false, volts, creeps);
             let what = format!("{words:?}, {level_v} V, {eased_v} V, {falls_v_per_s} V/s");
             near(&what, seen, found);
+        }
+    }
+}
+
+#[test]
+fn an_axis_whose_friction_eased_is_held_on_the_other_side_of_zero_while_the_reference_stands() {
+    for (regained_v, crosses_v) in [(0.1, 0.09), (0.1, 0.3), (0.0, 0.09)] {
+        let model = PlausibilityModel {
+            eased_v: 1.5,
+            regained_v,
+            ..model()
+        };
+        for (words, level_v) in AMPLIFIERS
+            .into_iter()
+            .flat_map(|words| [0.65_f64, -0.65].map(|level_v| (words, level_v)))
+        {
+            let axis = Plausibility::new(&model, words, COUNT_MM, PERIOD_S);
+            let crossed_v = -crosses_v * level_v.signum();
+            let volts = |time_s: f64| if time_s < 0.5 { level_v } else { crossed_v };
+            let creeps = |time_s: f64| (2.0 * time_s.min(0.5), 0.0);
+            let found = time_until_found(&axis, words, false, volts, creeps);
+            assert_eq!(found.is_none(), crosses_v < regained_v, "{crosses_v} V");
         }
     }
 }
@@ -604,6 +628,7 @@ fn following_model() -> PlausibilityModel {
     PlausibilityModel {
         held_v: NEVER_V,
         eased_v: 0.0,
+        regained_v: 0.0,
         load_v: NEVER_V,
         first_load_v: NEVER_V,
         sliding_v: 0.1,
@@ -727,6 +752,7 @@ fn an_axis_that_slid_and_stands_takes_up_little_more_in_that_sense() {
         stuck_v: 0.1,
         held_v: 0.6,
         eased_v: 0.0,
+        regained_v: 0.0,
         ..model()
     };
     let stands = |_| 0.0;
@@ -773,6 +799,7 @@ fn is_found(
         answer_v_s_per_mm,
         held_v: NEVER_V,
         eased_v: 0.0,
+        regained_v: 0.0,
         ..model()
     };
     let axis = Plausibility::new(&model, AMPLIFIERS[0], COUNT_MM, PERIOD_S);

@@ -11,6 +11,7 @@ use quadrant_sim::sine_test::SineTest;
 use super::VerifyError;
 use super::law_result::{LawResult, MAX_ERROR_RATIO, MAX_SCATTER_RATIO};
 use super::sines::CHOICE_SINES;
+use super::small::Refused;
 use super::small_motions::FROM_MM_S;
 use super::trials::Trials;
 use super::variants::{feeding_beyond, feeding_from, with_friction};
@@ -51,8 +52,9 @@ const LESS: [Remedy; 4] = [
 const STROKE_ROOM: f64 = 1.1;
 /// Longest stroke up to which no friction is fed forward, mm: less friction is the remedy of what is worse on longer ones.
 const MOST_STROKE_MM: f64 = 0.12;
-/// Part of such a law's name before the length.
+/// Parts of such a law's name before and after the length.
 const STROKES: &str = ", strokes from ";
+const ON: &str = " mm on";
 
 impl Remedy {
     /// The same for a law that may have no nonlinear gain to lose.
@@ -127,7 +129,7 @@ impl Trials<'_, '_> {
             return Ok(found);
         }
         let mut whole = self.laws[chosen].clone();
-        if !self.is_far_worse_when_small(&mut whole)? {
+        if self.errors_unless_far(&mut whole)?.is_some() {
             return Ok(chosen);
         }
         self.laws[chosen] = whole.clone();
@@ -141,12 +143,18 @@ impl Trials<'_, '_> {
             let Some(mut found) = self.begin_remedy(remedy, whole) else {
                 continue;
             };
-            if self.is_far_worse_when_small(&mut found)? {
+            let Some(errors_mm) = self.errors_unless_far(&mut found)? else {
                 continue;
-            }
+            };
+            let worse = self.worst_when_small(&errors_mm).map(|worse| Refused {
+                law: found.law.clone(),
+                factor: 1.0,
+                worse: Some(worse),
+            });
             if let Some((found, worst)) = self.run_remedy(found)
                 && worst < MAX_REMEDY_RATIO
             {
+                self.refused.extend(worse);
                 return Ok(found);
             }
         }
@@ -179,6 +187,12 @@ impl Trials<'_, '_> {
         Ok(0)
     }
 
+    /// True if the last law that was refused was so on a motion on which every remedy feeds friction forward.
+    fn is_refused_when_fast(&self) -> bool {
+        let worse = self.refused.last().and_then(|refused| refused.worse);
+        worse.is_some_and(|worse| worse.motion.velocity_mm_s() > FROM_MM_S)
+    }
+
     /// A law that feeds friction forward beyond the stroke on which it was refused, where that is a short one, and the usual sines are so much
     /// longer that it does on them what it did.
     fn beyond_refused_stroke(&self, law: &LawResult) -> Option<LawResult> {
@@ -188,16 +202,15 @@ impl Trials<'_, '_> {
         let tries = from_mm > law.settings.feedforward.from_mm
             && from_mm <= MOST_STROKE_MM
             && self.bench.sines.iter().all(is_longer);
-        let whole = law.law.split(STROKES).next()?;
         tries.then(|| LawResult {
-            law: format!("{whole}{STROKES}{from_mm:.3} mm on"),
+            law: beyond_strokes(&law.law, from_mm),
             settings: feeding_beyond(&law.settings, from_mm),
             ..law.clone()
         })
     }
 
-    /// Runs a changed law: its index, and the largest of its errors over the PID's on the usual sines; none if it is worse than the PID
-    /// when small, or gains too little on the mean.
+    /// Runs a changed law, where it is refused on a short quick stroke beyond that: its index, and the largest of its errors over the PID's on the
+    /// usual sines; none if it is worse than the PID when small, or gains too little on the mean.
     fn try_remedy(
         &mut self,
         remedy: Remedy,
@@ -206,8 +219,15 @@ impl Trials<'_, '_> {
         let Some(mut found) = self.begin_remedy(remedy, law) else {
             return Ok(None);
         };
-        if self.refuses_when_small(&mut found)? || found.stopped.is_some() {
-            return Ok(None);
+        while self.refuses_when_small(&mut found)? {
+            // Of slow motions the next remedy takes care.
+            let beyond = self
+                .is_refused_when_fast()
+                .then(|| self.beyond_refused_stroke(&found));
+            let Some(beyond) = beyond.flatten() else {
+                return Ok(None);
+            };
+            found = beyond;
         }
         Ok(self.run_remedy(found))
     }
@@ -239,12 +259,30 @@ impl Trials<'_, '_> {
     }
 }
 
+/// The name of a law that feeds friction forward on strokes from a length on, mm, by that of one that may do so from a shorter one on.
+fn beyond_strokes(law: &str, from_mm: f64) -> String {
+    let (whole, shorter) = law.split_once(STROKES).unwrap_or((law, ""));
+    let others = shorter.split_once(ON).map_or("", |(_, others)| others);
+    format!("{whole}{STROKES}{from_mm:.3}{ON}{others}")
+}
+
 #[cfg(test)]
 mod tests {
     use quadrant_settings::{FeedbackSettings, StageSettings};
 
     use super::*;
     use crate::record::Recording;
+
+    #[test]
+    fn a_law_that_is_refused_on_a_longer_stroke_keeps_the_rest_of_its_name() {
+        assert_eq!(
+            beyond_strokes("N-PID", 0.044),
+            "N-PID, strokes from 0.044 mm on"
+        );
+        let refused = "PID, strokes from 0.044 mm on, from 1.6 mm/s";
+        let name = beyond_strokes(refused, 0.11);
+        assert_eq!(name, "PID, strokes from 0.110 mm on, from 1.6 mm/s");
+    }
 
     #[test]
     fn each_remedy_feeds_less_friction_forward_when_slow_and_as_much_when_fast() {

@@ -42,19 +42,25 @@ pub struct Worse {
     pub pid_mm: f64,
 }
 
+impl Worse {
+    fn ratio(&self) -> f64 {
+        self.largest_mm / self.pid_mm
+    }
+}
+
 /// Error over the PID's on a small motion from which on a law that no remedy mends is not chosen, whatever it gains on others.
 const FAR_RATIO: f64 = 1.5;
 /// Least excess of such an error over the PID's, counts.
 const FAR_COUNTS: f64 = 5.0;
 
 impl Trials<'_, '_> {
-    /// True if a law's largest error on any small motion exceeds the PID's by far, at which it ends, or it is stopped.
-    pub(super) fn is_far_worse_when_small(
+    /// Largest errors of a law on the small motions, mm; none if one exceeds the PID's by far, or the law is stopped.
+    pub(super) fn errors_unless_far(
         &mut self,
         law: &mut LawResult,
-    ) -> Result<bool, VerifyError> {
+    ) -> Result<Option<Vec<f64>>, VerifyError> {
         if law.stopped.is_some() {
-            return Ok(true);
+            return Ok(None);
         }
         let motions = self.bench.small_motions;
         self.run_pid_when_small(motions.len())?;
@@ -66,12 +72,29 @@ impl Trials<'_, '_> {
             pid_mm.is_some_and(|pid_mm| own_mm > FAR_RATIO * pid_mm && own_mm - pid_mm > least_mm)
         };
         match self.bench.run_small(law, &settings, motions, is_far) {
-            Err(_) if law.stopped.is_some() => Ok(true),
-            outcome => Ok(outcome?
-                .iter()
-                .enumerate()
-                .any(|(index, own_mm)| is_far(index, *own_mm))),
+            Err(_) if law.stopped.is_some() => Ok(None),
+            outcome => {
+                let errors_mm = outcome?;
+                let mut each = errors_mm.iter().enumerate();
+                let is_any_far = each.any(|(index, own_mm)| is_far(index, *own_mm));
+                Ok((!is_any_far).then_some(errors_mm))
+            }
         }
+    }
+
+    /// The motion on which errors that were measured on all small ones are worst beside the PID's, if they are worse on any.
+    pub(super) fn worst_when_small(&self, errors_mm: &[f64]) -> Option<Worse> {
+        let count_mm = self.pid.encoder.resolution_mm;
+        let pairs = errors_mm.iter().zip(&self.pid_when_small_mm);
+        let worse = self.bench.small_motions.iter().zip(pairs);
+        worse
+            .map(|(motion, (largest_mm, pid_mm))| Worse {
+                motion: *motion,
+                largest_mm: *largest_mm,
+                pid_mm: *pid_mm,
+            })
+            .filter(|it| is_worse(it.largest_mm, it.pid_mm, count_mm))
+            .max_by(|a, b| a.ratio().total_cmp(&b.ratio()))
     }
 
     /// Runs a law on all small motions, unless it is stopped: its largest errors, mm.
