@@ -22,6 +22,7 @@
 //! ```
 
 mod build;
+mod fading;
 mod output;
 mod rest;
 mod state;
@@ -30,6 +31,7 @@ pub mod telemetry;
 use crate::hint::cold_path;
 
 pub use self::build::{AxisBuilder, AxisError};
+use self::fading::FadingState;
 use self::output::Amplifier;
 pub use self::output::OutputStage;
 use self::rest::RestState;
@@ -400,6 +402,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         }
         state.feedback.unload(gained);
         state.rest.unload(gained);
+        state.fading.unload(gained);
     }
 
     /// Takes a step of cancelling, on what the last tick left.
@@ -472,6 +475,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             injected,
             feedback,
             rest,
+            fading,
             filters,
             friction,
             generator,
@@ -496,6 +500,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         *injected = S::ZERO;
         *feedback = FeedbackState::default();
         *rest = RestState::default();
+        *fading = FadingState::default();
         *filters = FiltersState::default();
         *friction = self.feedforward.start();
         generator.reset();
@@ -768,7 +773,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
                 total = total + self.add_cancelling(state, changed);
             }
         }
-        if state.oscillation.is_reduced() {
+        if state.oscillation.is_reduced() | state.oscillation.has_changed() {
             total = self.take_away(state, total);
         }
         let input = FeedbackInput {
@@ -817,11 +822,17 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if !moves {
             return state.rest.stop(integral);
         }
+        state.fading.set_off(integral);
+        let returns = self.oscillation.returns_from_rest(&mut state.oscillation);
         let Some(mut taken) = state.rest.set_off(integral) else {
             return;
         };
-        // What friction that is not fed forward took over would be lost.
-        if self.oscillation.may_fade(&state.oscillation) {
+        if returns {
+            // The axis was held by the integral, not by what the model says.
+            state.friction = self.feedforward.start();
+            taken = state.fading.taken_up(integral);
+        } else if self.oscillation.may_fade(&state.oscillation) {
+            // What friction that is not fed forward took over would be lost.
             return;
         }
         if self.learns {
@@ -862,10 +873,30 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     #[inline(never)]
     fn take_away(&self, state: &mut AxisState<S, N>, total: S) -> S {
         let share = self.oscillation.share(&state.oscillation);
+        if state.oscillation.has_changed() {
+            self.give_back(state);
+        }
         let terms = &mut state.telemetry.feedforward;
         let cancelled = total - terms.total();
         terms.scale_friction(share);
         terms.total() + cancelled
+    }
+
+    /// Lets the integral give back what it has taken up of friction that returns.
+    #[cold]
+    #[inline(never)]
+    fn give_back(&self, state: &mut AxisState<S, N>) {
+        let integral = state.feedback.integral();
+        if state.oscillation.was_whole() {
+            state.fading.begin(integral);
+        }
+        let returned = self.oscillation.returned(&mut state.oscillation);
+        let friction = state.telemetry.feedforward.friction();
+        let friction = friction.times(returned, Quantity::Multiplier);
+        let given = state.fading.returns(integral, friction);
+        state.feedback.unload(given);
+        state.rest.unload(given);
+        self.filters.shift(&mut state.filters, -given);
     }
 
     /// Puts the injected voltage out.
@@ -946,6 +977,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             // As after enabling: the law's memory is of before, and its error is zero now.
             state.feedback = FeedbackState::default();
             state.rest.forget();
+            state.fading = FadingState::default();
             state.filters = FiltersState::default();
             state.friction = self.feedforward.start();
             self.learning.resume(&mut state.learning);

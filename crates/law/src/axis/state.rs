@@ -1,6 +1,7 @@
 //! The memory of an axis.
 
 use super::PREVIEW_ROOM;
+use super::fading::FadingState;
 use super::rest::RestState;
 use super::telemetry::AxisTelemetry;
 use crate::cancelling::{CancellingState, SpindleSpeed};
@@ -45,6 +46,7 @@ pub struct AxisState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     pub(super) injected: S,
     pub(super) feedback: FeedbackState<S>,
     pub(super) rest: RestState<S>,
+    pub(super) fading: FadingState<S>,
     pub(super) filters: FiltersState<S>,
     pub(super) friction: FeedforwardState<S, N>,
     pub(super) generator: GeneratorState<S>,
@@ -85,6 +87,7 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             reference_velocity: S::ZERO,
             feedback: FeedbackState::default(),
             rest: RestState::default(),
+            fading: FadingState::default(),
             filters: FiltersState::default(),
             friction: FeedforwardState::default(),
             injected: S::ZERO,

@@ -11,8 +11,12 @@
 //!   returns at once with a stroke more than twice as long, in which it need not harm.
 //! - **Slow or short motions**, where the settings say that friction fed forward does harm there: it fades within 50 ms by the largest speed
 //!   of the reference in this stroke and the one before, and by the longer one of both, so that a reversal of a fast or long motion still
-//!   has all of it. After a tenth of a second at rest, a motion is slow and short until it is fast and long. Of a move or a sine of the plan,
-//!   both are known from the start. From enabling to the first motion, none is fed forward.
+//!   has all of it. A stroke that begins after a tenth of a second at rest is fast and long until it turns: it is mostly a move, and what harms
+//!   is a reversal of a small sine. Of a move or a sine of the plan, both are known from the start; from enabling to the first one, none is
+//!   fed forward.
+//!
+//! What returns, the integral gives back as far as it has risen for it; else friction would act twice.
+//!
 //! - **Hum.** At rest, the error swings evenly at 20 Hz or more for a second. It is reported, and nothing is done.
 //! - **Instability.** The error swings evenly for a second, each time by more than a limit and by more than twice the distance
 //!   that the reference goes meanwhile. That is a fault.
@@ -46,7 +50,7 @@ const TRIAL_S: f64 = 5.0;
 /// Window in which an oscillation is even, and time of rest before it counts as hum, s.
 const WINDOW_S: f64 = 1.0;
 
-/// Time at rest after which a motion has nothing to do with the one before, s.
+/// Time at rest after which a stroke has nothing to do with the one before, s.
 const PAUSE_S: f64 = 0.1;
 
 /// Strokes one after the other at whose ends the error has swung too far, in them or from the one to the other.
@@ -180,6 +184,8 @@ pub struct OscillationState {
     reduced: u8,
     /// The same because the motion is slow.
     faded: u8,
+    /// Steps by which it was reduced, or faded, when [`Oscillation::returned`] was asked for.
+    left_out_before: u8,
     /// Strokes of the motion under way, if they are known.
     planned: Option<PlannedStroke>,
     pace: Pace,
@@ -321,18 +327,26 @@ impl<S: Scalar> Oscillation<S> {
     /// Forgets everything but what has been reported: the outputs are off. Where friction fed forward fades, there is none until a motion
     /// shows that it is to be.
     pub(crate) fn restart(&self, state: &mut OscillationState) {
+        let faded = if self.may_ever_fade() {
+            REDUCTION_STEPS
+        } else {
+            0
+        };
         *state = OscillationState {
             reading: state.reading,
-            faded: if self.fades() { REDUCTION_STEPS } else { 0 },
+            faded,
+            left_out_before: faded,
             ..OscillationState::default()
         };
     }
 
     /// Forgets what was found under other settings; the motion under way goes on.
     pub(crate) fn forget(&self, state: &mut OscillationState) {
+        let faded = if self.may_ever_fade() { state.faded } else { 0 };
         *state = OscillationState {
             reading: state.reading,
-            faded: if self.fades() { state.faded } else { 0 },
+            faded,
+            left_out_before: faded,
             planned: state.planned,
             pace: state.pace,
             ..OscillationState::default()
@@ -341,25 +355,49 @@ impl<S: Scalar> Oscillation<S> {
 
     /// The share of the friction feedforward that acts, a [`Quantity::Multiplier`], while it is reduced.
     pub fn share(&self, state: &OscillationState) -> S {
-        S::scale_integer(
-            i32::from(REDUCTION_STEPS - state.reduced.max(state.faded)),
-            self.share,
-        )
+        S::scale_integer(i32::from(REDUCTION_STEPS - state.left_out()), self.share)
+    }
+
+    /// The share of the friction feedforward, a [`Quantity::Multiplier`], that acts again since this was asked for; zero if less acts.
+    pub(crate) fn returned(&self, state: &mut OscillationState) -> S {
+        let left_out = state.left_out();
+        let before = core::mem::replace(&mut state.left_out_before, left_out);
+        S::scale_integer(i32::from(before.saturating_sub(left_out)), self.share)
+    }
+
+    /// True if a stroke of unknown end begins now, after a rest, and friction that had faded returns with it; then all of it acts.
+    pub(crate) fn returns_from_rest(&self, state: &mut OscillationState) -> bool {
+        let returns = (state.faded > 0)
+            & (state.reduced == 0)
+            & state.planned.is_none()
+            & self.has_paused(state);
+        if returns {
+            (state.faded, state.left_out_before) = (0, 0);
+        }
+        returns
     }
 
     /// True while less than all of the friction feedforward acts, and of a motion that begins now in which less may.
     pub fn may_fade(&self, state: &OscillationState) -> bool {
         let fades = match state.planned {
             Some(planned) => self.steps(planned.speed, planned.counts) > 0,
-            None => state.pace.rested >= self.pause_looks,
+            None => {
+                let stroke = state.pace;
+                !self.has_paused(state) && self.steps(stroke.most, stroke.way) > 0
+            }
         };
-        state.is_reduced() | (self.fades() & fades)
+        state.is_reduced() | (self.may_ever_fade() & fades)
+    }
+
+    /// True of an axis whose next stroke has nothing to do with the one before.
+    fn has_paused(&self, state: &OscillationState) -> bool {
+        (state.pace.rested >= self.pause_looks) | (state.pace.sense == 0)
     }
 
     /// Looks at the axis; returns false if it is not stable.
     #[inline(never)]
     pub fn step(&self, state: &mut OscillationState, input: OscillationInput) -> bool {
-        if self.fades() {
+        if self.may_ever_fade() {
             self.fade(state, input);
         }
         if input.excited {
@@ -387,23 +425,23 @@ impl<S: Scalar> Oscillation<S> {
     fn fade(&self, state: &mut OscillationState, input: OscillationInput) {
         let OscillationInput { sense, speed, .. } = input;
         let reference = input.reference as i32;
+        let has_paused = self.has_paused(state);
         let pace = &mut state.pace;
         if sense == 0 {
             pace.rested = pace.rested.saturating_add(1);
             return;
         }
-        let rested = core::mem::take(&mut pace.rested);
-        let paused = rested >= self.pause_looks;
-        if (sense != pace.sense) | paused {
+        if (sense != pace.sense) | has_paused {
             (pace.most_before, pace.way_before) = match state.planned {
                 Some(planned) => (planned.speed, planned.counts),
-                None if paused => (0, 0),
+                None if has_paused => (u32::MAX, u32::MAX),
                 None => (pace.most, pace.way),
             };
             pace.sense = sense;
             pace.from = reference;
             (pace.most, pace.way) = (0, 0);
         }
+        pace.rested = 0;
         pace.most = pace.most.max(speed);
         pace.way = reference.wrapping_sub(pace.from).unsigned_abs();
         let most = pace.most.max(pace.most_before);
@@ -422,7 +460,7 @@ impl<S: Scalar> Oscillation<S> {
 
     /// True if there are motions on which less friction is fed forward.
     #[inline(always)]
-    fn fades(&self) -> bool {
+    fn may_ever_fade(&self) -> bool {
         self.feeds_friction & (self.slow.from | self.short.from > 0)
     }
 
@@ -432,8 +470,9 @@ impl<S: Scalar> Oscillation<S> {
         let Some(planned) = planned else {
             return;
         };
-        if self.fades() && state.pace.most == 0 {
+        if self.may_ever_fade() && state.pace.most == 0 {
             state.faded = self.steps(planned.speed, planned.counts);
+            state.left_out_before = state.left_out();
         }
         state.pace.sense = 0;
     }
@@ -623,9 +662,24 @@ impl OscillationReading {
 }
 
 impl OscillationState {
+    /// True if more or less of the friction feedforward acts than when [`Oscillation::returned`] was asked for.
+    pub(crate) fn has_changed(&self) -> bool {
+        self.left_out_before != self.left_out()
+    }
+
+    /// True if all of it acted then.
+    pub(crate) fn was_whole(&self) -> bool {
+        self.left_out_before == 0
+    }
+
+    /// Steps by which it is reduced, or faded.
+    fn left_out(&self) -> u8 {
+        self.reduced.max(self.faded)
+    }
+
     /// True while less than all of the friction feedforward acts.
     pub fn is_reduced(&self) -> bool {
-        self.reduced.max(self.faded) > 0
+        self.left_out() > 0
     }
 
     /// The oscillation that was found last.

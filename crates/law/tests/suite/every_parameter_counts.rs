@@ -105,8 +105,8 @@ fn perturbed(path: &str, value: &Value) -> Value {
                 "stiffness_per_s2" => 1e6,
                 // Whole ticks count.
                 "preview_s" | "debounce_s" => number * 0.9,
-                // The first stroke is long, whatever its length; the second is short.
-                "from_mm" => 50.0,
+                // The first stroke is long and fast, whatever it is; the second is not.
+                "from_mm" | "from_mm_s" => 50.0,
                 _ if number == 0.0 => 1e-3,
                 _ => number * 0.97,
             })

@@ -486,8 +486,11 @@ fn friction_is_fed_forward_by_the_fastest_of_two_strokes_and_stays_as_it_is_at_r
         forth: false,
         speed: counts(300),
     };
+    // The first stroke may be a fast one, until it turns.
     shown.strokes(1, 80, 10);
-    assert_eq!(shown.acts(), 0.0, "from rest");
+    assert_eq!(shown.acts(), 1.0, "from rest");
+    shown.strokes(1, 80, 10);
+    assert_eq!(shown.acts(), 0.0);
     // It comes with the first fast stroke, and is there through the reversal after it.
     for (speed, share) in [(counts(900), 1.0), (counts(100), 1.0), (counts(100), 0.0)] {
         shown.speed = speed;
@@ -500,10 +503,12 @@ fn friction_is_fed_forward_by_the_fastest_of_two_strokes_and_stays_as_it_is_at_r
     let half = shown.acts();
     shown.rest(2.0);
     assert_eq!(shown.acts(), half, "at rest");
-    // After a rest, what went before does not count.
+    // After a rest, what went before does not count: it returns.
     shown.speed = counts(100);
-    shown.strokes(1, 80, 10);
-    assert_eq!(shown.acts(), 0.0);
+    for share in [1.0, 0.0] {
+        shown.strokes(1, 80, 10);
+        assert_eq!(shown.acts(), share);
+    }
     // It fades over 50 ms, not at once.
     shown.speed = counts(2000);
     let mut share = shown.acts();
@@ -533,18 +538,18 @@ fn an_axis_whose_settings_say_nothing_of_slow_motions_feeds_friction_forward_on_
 }
 
 #[test]
-fn friction_is_fed_forward_on_strokes_beyond_a_length_and_after_a_rest_once_one_is_as_long() {
+fn friction_is_fed_forward_on_strokes_beyond_a_length_and_on_the_first_one_after_a_rest() {
     let mut shown = Shown::feeding_beyond_100_counts();
-    for (way, share) in [(80, 0.0), (1000, 1.0), (80, 1.0), (80, 0.0)] {
+    for (way, share) in [(80, 1.0), (80, 0.0), (1000, 1.0), (80, 1.0), (80, 0.0)] {
         shown.strokes(1, way, 10);
         assert_eq!(shown.acts(), share, "{way}");
     }
     shown.strokes(2, 150, 10);
     assert!((shown.acts() - 0.5).abs() < 0.03, "{}", shown.acts());
     // A reversal on a path rests for less than 0.1 s.
-    for (rest_s, share) in [(0.09, 1.0), (0.11, 0.0)] {
-        shown.strokes(1, 1000, 10);
-        assert_eq!(shown.acts(), 1.0);
+    for (rest_s, share) in [(0.09, 0.0), (0.11, 1.0)] {
+        shown.strokes(2, 80, 10);
+        assert_eq!(shown.acts(), 0.0);
         shown.rest(rest_s);
         shown.strokes(1, 80, 10);
         assert_eq!(shown.acts(), share, "after {rest_s} s");
@@ -554,10 +559,13 @@ fn friction_is_fed_forward_on_strokes_beyond_a_length_and_after_a_rest_once_one_
 #[test]
 fn a_motion_that_may_be_short_takes_nothing_over_from_the_integral() {
     let mut shown = Shown::feeding_beyond_100_counts();
+    assert!(!shown.monitor.may_fade(&shown.state), "the first one");
     shown.strokes(1, 1000, 10);
-    assert!(!shown.monitor.may_fade(&shown.state));
-    shown.rest(0.11);
-    assert!(shown.monitor.may_fade(&shown.state));
+    assert!(!shown.monitor.may_fade(&shown.state), "after a long one");
+    shown.strokes(1, 80, 10);
+    assert!(shown.monitor.may_fade(&shown.state), "after a short one");
+    shown.rest(0.2);
+    assert!(!shown.monitor.may_fade(&shown.state), "after a rest");
     for (counts, may) in [(1000, false), (50, true)] {
         let planned = Some(PlannedStroke { counts, speed: 1 });
         shown.monitor.plan(&mut shown.state, planned);
@@ -565,6 +573,80 @@ fn a_motion_that_may_be_short_takes_nothing_over_from_the_integral() {
     }
     let always = Oscillation::<f64>::new(true, 1e6, 1e-4);
     assert!(!always.may_fade(&OscillationState::default()));
+}
+
+#[test]
+fn friction_that_returns_in_a_stroke_does_not_throw_an_axis_whose_integral_holds_it() {
+    fn check<S: Scalar>() {
+        const FROM_MM: f64 = 0.3;
+        const SLOW_MM_S: f64 = 0.2;
+        let settings = x_alone(|x| {
+            x.feedback.law = LawKind::Pid;
+            x.feedforward.kind = FeedforwardKind::Combined;
+            x.feedforward.from_mm = FROM_MM;
+        });
+        let [axis, ..] = StageParameters::real().axes;
+        let mut bench = Bench::<S>::new(&settings, axis, &PlanSettings::default());
+        let jog = |bench: &mut Bench<S>, mm_s: f64, seconds: f64| {
+            let velocity = settings.jog_at(AxisName::X, mm_s).expect("slow enough");
+            bench.command(Command::Jog(AxisName::X, velocity));
+            bench.run(seconds);
+        };
+        // Short strokes without a rest between them, and a long one.
+        for _ in 0..2 {
+            jog(&mut bench, 2.0, 0.1);
+            jog(&mut bench, -2.0, 0.1);
+        }
+        jog(&mut bench, SLOW_MM_S, FROM_MM / SLOW_MM_S);
+        let fed_v = |bench: &Bench<S>| {
+            let terms = bench.rig.state.axes()[0].telemetry().feedforward;
+            terms.friction().to_f64(Quantity::Voltage)
+        };
+        assert!(fed_v(&bench) < 0.01, "{} V", fed_v(&bench));
+        let before_um = 1e3 * bench.tick();
+        let least_um = (0..20_000).fold(before_um, |least, _| least.min(1e3 * bench.tick()));
+        assert!(fed_v(&bench) > 0.1, "{} V", fed_v(&bench));
+        println!("{before_um:.1} um before, at least {least_um:.1} um then");
+        assert!(least_um > -0.1 * before_um, "{least_um} um");
+    }
+    check::<f32>();
+    check::<Fixed>();
+}
+
+#[test]
+fn friction_acts_at_once_on_a_stroke_after_a_rest_and_begins_with_what_the_integral_holds() {
+    fn largest_um<S: Scalar>(kind: FeedforwardKind) -> f64 {
+        let settings = x_alone(|x| {
+            x.feedback.law = LawKind::Pid;
+            x.feedforward.kind = kind;
+            x.feedforward.from_mm = 0.3;
+        });
+        let [axis, ..] = StageParameters::real().axes;
+        let mut bench = Bench::<S>::new(&settings, axis, &PlanSettings::default());
+        let jog = |bench: &mut Bench<S>, mm_s: f64, seconds: f64| {
+            let velocity = settings.jog_at(AxisName::X, mm_s).expect("slow enough");
+            bench.command(Command::Jog(AxisName::X, velocity));
+            bench.run(seconds).most
+        };
+        // Short strokes, and a longer one that is too slow for its friction to have returned: the integral holds it.
+        for mm_s in [2.0, -2.0, 2.0, -2.0] {
+            jog(&mut bench, mm_s, 0.1);
+        }
+        jog(&mut bench, 0.1, 2.0);
+        bench.command(Command::Stop);
+        bench.run(1.0);
+        jog(&mut bench, 2.0, 0.05);
+        let largest_um = bench.run(0.3).most;
+        println!("{kind:?}: {largest_um:.1} um");
+        largest_um
+    }
+    fn check<S: Scalar>() {
+        let pid_um = largest_um::<S>(FeedforwardKind::None);
+        let own_um = largest_um::<S>(FeedforwardKind::Combined);
+        assert!(own_um < 0.2 * pid_um, "{own_um} um for {pid_um}");
+    }
+    check::<f32>();
+    check::<Fixed>();
 }
 
 #[test]

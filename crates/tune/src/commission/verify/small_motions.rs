@@ -41,10 +41,10 @@ const fn moves(distance_mm: f64, velocity_mm_s: f64) -> SmallMotion {
     })
 }
 
-/// The small slow motions. The frequency decides if a table behind a spring is thrown: the short sines are at 3 to 12 Hz, and many of their
+/// The small slow motions. The frequency decides if a table behind a spring is thrown: most of the short sines are at 3 to 12 Hz, and many of their
 /// cycles count, for an axis that sticks does not do the same in each. The last ones are slow, or longer at a moderate speed: they show an axis that meets less
 /// friction at such a speed than is fed forward.
-const SMALL_MOTIONS: [SmallMotion; 21] = [
+const SMALL_MOTIONS: [SmallMotion; 22] = [
     sine(0.02, 0.6, Cycles::scoring(9)),
     sine(0.02, 0.9, Cycles::scoring(9)),
     sine(0.02, 1.2, Cycles::scoring(9)),
@@ -56,6 +56,7 @@ const SMALL_MOTIONS: [SmallMotion; 21] = [
     sine(0.08, 1.45, Cycles::scoring(9)),
     sine(0.15, 1.55, Cycles::scoring(5)),
     sine(0.02, 0.35, Cycles::scoring(9)),
+    sine(0.05, 0.25, Cycles::of_slow(3)),
     moves(0.025, 0.38),
     moves(0.02, 1.3),
     moves(0.05, 8.0),
@@ -68,7 +69,7 @@ const SMALL_MOTIONS: [SmallMotion; 21] = [
     sine(0.5, 0.2, Cycles::of_slow(1)),
 ];
 /// Number of them, the short ones, after which the PID's scores on the others are needed: those take most of the time.
-pub(super) const SHORT_MOTIONS: usize = 15;
+pub(super) const SHORT_MOTIONS: usize = 16;
 /// Number of them, the first ones, on which a law has to keep its margin: there the table is thrown by what is fed forward beyond its friction.
 pub(super) const MARGIN_MOTIONS: usize = 7;
 /// Velocity that none of the sines exceeds, mm/s.
