@@ -27,6 +27,9 @@ use super::drift::Drift;
 use super::ringing::Ringing;
 use crate::test_axis::{AxisInfo, ExperimentError, MachineError, TestAxis};
 
+/// Least error that is a fault, over the largest that the PID or the chosen law left.
+const FOLLOWING_ROOM: f64 = 4.0;
+
 /// All trials, and the chosen law.
 #[derive(Clone, Debug)]
 pub struct Verification {
@@ -66,12 +69,19 @@ impl Verification {
         law.against(&self.laws[0], &self.drift)
     }
 
-    /// Settings of the chosen law, with the limits of `base`.
+    /// Settings of the chosen law, with the limits of `base`, and room for what a healthy axis errs.
     pub fn settings(&self, base: &AxisSettings) -> AxisSettings {
-        AxisSettings {
+        let mut settings = AxisSettings {
             limits: base.limits,
             ..self.chosen().settings.clone()
-        }
+        };
+        let scores = self.laws[0].scores.iter().chain(&self.chosen().scores);
+        let largest_mm = scores.fold(0.0, |most, score| f64::max(most, score.largest_mm));
+        let limits = &mut settings.limits;
+        limits.following_error_mm = limits
+            .following_error_mm
+            .max((FOLLOWING_ROOM * largest_mm).min(limits.following_error_max_mm));
+        settings
     }
 }
 
