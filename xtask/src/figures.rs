@@ -64,6 +64,14 @@ const SENTENCES: &[(&str, &str)] = &[
          axis; the\nlongest {count: f32, NPid, Combined.total.max} and {count: f32, NPid, Combined, learning.total.max}.",
     ),
     (
+        "docs/learning.md",
+        "in fixed point, {count: fixed, NPid, Combined.total.mean} and {count: fixed, NPid, Combined, learning.total.mean}, ",
+    ),
+    (
+        "docs/tick.md",
+        "The converter's driver comes on top, {cycles: converter.no_wait_states} cycles.",
+    ),
+    (
         "docs/board-nucleo-f446re.md",
         "outputs off are that short, {count: f32, enable.total.min} instructions and more; the shortest counted that drives takes {count: f32, motions start.total.min}.",
     ),

@@ -12,11 +12,8 @@
 //! - **Slow or short motions**, where the settings say that friction fed forward does harm there: it fades within 50 ms by the largest speed
 //!   of the reference in this stroke and the one before, and by the longer one of both, so that a reversal of a fast or long motion still
 //!   has all of it. A stroke that begins after a tenth of a second at rest is fast and long until it turns: it is mostly a move, and what harms
-//!   is a reversal of a small sine. Of a move or a sine of the plan, both are known from the start; from enabling to the first one, none is
-//!   fed forward.
-//!
-//! What returns, the integral gives back as far as it has risen for it; else friction would act twice.
-//!
+//!   is a reversal of a small sine. Of a move or a sine of the plan, both are known from the start; an axis that rests after enabling has none.
+//!   Friction that returns would act beside an integral that holds it, and throw the axis: the integral gives back what it has taken up.
 //! - **Hum.** At rest, the error swings evenly at 20 Hz or more for a second. It is reported, and nothing is done.
 //! - **Instability.** The error swings evenly for a second, each time by more than a limit and by more than twice the distance
 //!   that the reference goes meanwhile. That is a fault.
