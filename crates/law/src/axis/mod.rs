@@ -823,18 +823,18 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             return state.rest.stop(integral);
         }
         state.fading.set_off(integral);
-        let returns = self.oscillation.returns_from_rest(&mut state.oscillation);
-        let Some(mut taken) = state.rest.set_off(integral) else {
-            return;
-        };
-        if returns {
+        let since_stop = state.rest.set_off(integral);
+        let taken = if self.oscillation.returns_from_rest(&mut state.oscillation) {
             // The axis was held by the integral, not by what the model says.
             state.friction = self.feedforward.start();
-            taken = state.fading.taken_up(integral);
-        } else if self.oscillation.may_fade(&state.oscillation) {
+            Some(state.fading.taken_up(integral))
+        } else {
             // What friction that is not fed forward took over would be lost.
+            since_stop.filter(|_| !self.oscillation.may_fade(&state.oscillation))
+        };
+        let Some(mut taken) = taken else {
             return;
-        }
+        };
         if self.learns {
             taken = self.learning.unscaled(&state.learning, taken);
         }
@@ -842,8 +842,15 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if self.learns {
             taken = self.learning.take_over(&mut state.learning, taken);
         }
-        state.feedback.unload(taken);
-        self.filters.shift(&mut state.filters, -taken);
+        self.unload(state, taken);
+    }
+
+    /// Takes a voltage that something else puts out from the integral.
+    #[inline(always)]
+    fn unload(&self, state: &mut AxisState<S, N>, voltage: S) {
+        state.feedback.unload(voltage);
+        state.rest.unload(voltage);
+        self.filters.shift(&mut state.filters, -voltage);
     }
 
     /// Scales the friction's feedforward as was learnt; returns the whole feedforward, V.
@@ -894,9 +901,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let friction = state.telemetry.feedforward.friction();
         let friction = friction.times(returned, Quantity::Multiplier);
         let given = state.fading.returns(integral, friction);
-        state.feedback.unload(given);
-        state.rest.unload(given);
-        self.filters.shift(&mut state.filters, -given);
+        self.unload(state, given);
     }
 
     /// Puts the injected voltage out.

@@ -615,7 +615,7 @@ fn friction_that_returns_in_a_stroke_does_not_throw_an_axis_whose_integral_holds
 
 #[test]
 fn friction_acts_at_once_on_a_stroke_after_a_rest_and_begins_with_what_the_integral_holds() {
-    fn largest_um<S: Scalar>(kind: FeedforwardKind) -> f64 {
+    fn largest_um<S: Scalar>(kind: FeedforwardKind, changed_at_rest: bool) -> f64 {
         let settings = x_alone(|x| {
             x.feedback.law = LawKind::Pid;
             x.feedforward.kind = kind;
@@ -635,15 +635,20 @@ fn friction_acts_at_once_on_a_stroke_after_a_rest_and_begins_with_what_the_integ
         jog(&mut bench, 0.1, 2.0);
         bench.command(Command::Stop);
         bench.run(1.0);
+        bench.rig.inputs.settings_changed[AxisName::X] = changed_at_rest;
+        bench.tick();
+        bench.rig.inputs.settings_changed[AxisName::X] = false;
         jog(&mut bench, 2.0, 0.05);
         let largest_um = bench.run(0.3).most;
         println!("{kind:?}: {largest_um:.1} um");
         largest_um
     }
     fn check<S: Scalar>() {
-        let pid_um = largest_um::<S>(FeedforwardKind::None);
-        let own_um = largest_um::<S>(FeedforwardKind::Combined);
-        assert!(own_um < 0.2 * pid_um, "{own_um} um for {pid_um}");
+        for changed_at_rest in [false, true] {
+            let pid_um = largest_um::<S>(FeedforwardKind::None, changed_at_rest);
+            let own_um = largest_um::<S>(FeedforwardKind::Combined, changed_at_rest);
+            assert!(own_um < 0.2 * pid_um, "{own_um} um for {pid_um}");
+        }
     }
     check::<f32>();
     check::<Fixed>();
