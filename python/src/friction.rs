@@ -322,7 +322,7 @@ pub(crate) fn fit_runs<'py>(
         .collect();
     runs.sort_by(|a, b| a.velocity_mm_s.total_cmp(&b.velocity_mm_s));
     let exponent = exponent.map_or(Exponent::Free, Exponent::Fixed);
-    let fitted = fit_map(&FrictionMap { runs }, exponent).map_err(errors::of)?;
+    let fitted = fit_map(&FrictionMap { runs }, exponent, None).map_err(errors::of)?;
     let found = PyDict::new(py);
     found.set_item("offset", fitted.offset_v)?;
     for (name, direction) in [

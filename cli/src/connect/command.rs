@@ -411,7 +411,7 @@ pub(super) enum CrossedEdge {
 pub(super) enum IdentifyCommand {
     /// Move the axis to and fro by up to 60 mm, and find inertia and friction in that motion.
     Motion(IdentifyOptions),
-    /// Move the axis at 16 velocities from 0.1 to 40 mm/s, both ways, and fit the static model; within +-100 mm.
+    /// Move the axis at 16 velocities from 0.05 to 40 mm/s, both ways, about the middle of its travel, and fit the static model; within +-90 mm.
     StaticFriction(IdentifyOptions),
     /// Move the axis in a slow sine of micrometres under a quiet controller, and identify the GMS model; needs a plant in the
     /// settings.

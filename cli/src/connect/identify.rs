@@ -90,10 +90,10 @@ fn measure(
             })
         }
         IdentifyCommand::StaticFriction(_) => {
-            let settings = StaticFrictionSettings::default();
+            let settings = StaticFrictionSettings::default().fitted_to(&test_axis.info());
             let (map, _) = friction::run_at_velocities(test_axis, base, &settings)?;
             map.write_csv(&options.out)?;
-            Ok(friction_table(&fit_map(&map, Exponent::Free)?).into())
+            Ok(friction_table(&fit_map(&map, Exponent::Free, None)?).into())
         }
         IdentifyCommand::VirginCurve(_) => {
             let (recording, _) = sine::Sine::default().measure(test_axis, base)?;

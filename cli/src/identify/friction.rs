@@ -113,7 +113,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             (map, recorded::title(std::slice::from_ref(path)), None)
         }
     };
-    let found = fit_map(&map, exponent)?;
+    let found = fit_map(&map, exponent, None)?;
     output.table(&friction_table(&found))?;
     output.section(
         "Static friction",

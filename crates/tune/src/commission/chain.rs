@@ -14,6 +14,7 @@ use super::ringing::Ringing;
 use super::velocity_mode;
 use super::verify::{Verification, VerifyError, verify};
 use crate::identify::motor_constant::{self, MotorConstantSettings};
+use crate::identify::plant::PlantFit;
 use crate::identify::static_friction::{
     self, FrictionFit, FrictionFitError, FrictionMap, StaticFrictionError, StaticFrictionSettings,
 };
@@ -128,7 +129,9 @@ fn guarded(
             ..measuring.clone()
         });
         test_axis.apply(&measuring)?;
-        let measured = friction(test_axis, runs, &mut |share| report(watch, step, share));
+        let measured = friction(test_axis, runs, &plant, &mut |share| {
+            report(watch, step, share);
+        });
         let (map, recordings, found) = match measured {
             Err(CommissionError::Friction(StaticFrictionError::Experiment(error)))
                 if stopped < models::MAX_SOFTENINGS
@@ -153,8 +156,8 @@ fn guarded(
     step += 1;
     let process = models::process(&plant, &controller.filters);
     let quiet = low_bandwidth_settings_on(&settings, &plant.plant, &process, rate_hz);
-    let moving = runs.two_sided.then(|| measuring_settings(&settings));
-    let (recording, gms) = presliding(test_axis, &friction, &quiet, moving, &mut |share| {
+    let moving = measuring_settings(&settings);
+    let (recording, gms) = presliding(test_axis, &friction, &quiet, &moving, &mut |share| {
         report(watch, step, share);
     })?;
 
@@ -269,21 +272,20 @@ type Friction = (
 fn friction(
     test_axis: &mut dyn TestAxis,
     mut runs: StaticFrictionSettings,
+    plant: &PlantFit,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Friction, CommissionError> {
     loop {
-        let start_mm = runs.start_mm(test_axis.info().travel_mm);
-        approach(test_axis, start_mm).map_err(StaticFrictionError::from)?;
         let (map, recordings) = static_friction::measure(test_axis, &runs, progress)?;
         let (slowest, fastest) = &mut runs.velocities_mm_s;
-        match models::even_friction(&map) {
+        match models::even_friction(&map, plant) {
             Err(FrictionFitError::TooFewRuns { .. } | FrictionFitError::Sign { .. })
                 if SLOWEST_VELOCITY_RAISE * *slowest < *fastest / SLOWEST_VELOCITY_RAISE =>
             {
                 *slowest *= SLOWEST_VELOCITY_RAISE;
             }
             _ => {
-                let found = models::friction(&map);
+                let found = models::friction(&map, plant);
                 return Ok((map, recordings, found));
             }
         }
@@ -292,12 +294,12 @@ fn friction(
 
 /// The hysteresis before sliding, and the elements from it. On an axis that breaks away under noise or vibration, a slow motion meets
 /// less friction than it will in use: quicker sines are tried until one meets what sliding did, and the one that meets most counts.
-/// The sines run under `quiet`, from the middle of the travel, to which the axis goes under `moving`; from where it stands without.
+/// The sines run under `quiet`, from the middle of the travel, to which the axis goes under `moving`.
 fn presliding(
     test_axis: &mut dyn TestAxis,
     friction: &FrictionFit,
     quiet: &AxisSettings,
-    moving: Option<AxisSettings>,
+    moving: &AxisSettings,
     progress: &mut dyn FnMut(f64),
 ) -> Result<(Recording, Result<GmsFit, VirginCurveError>), CommissionError> {
     let (coulomb_v, breakaway_v) = friction.mean_levels_v();
@@ -311,10 +313,8 @@ fn presliding(
     let measure = |test_axis: &mut dyn TestAxis,
                    sine: &VirginCurveSettings,
                    progress: &mut dyn FnMut(f64)| {
-        if let Some(moving) = &moving {
-            test_axis.apply(moving)?;
-            approach(test_axis, HOME_MM)?;
-        }
+        test_axis.apply(moving)?;
+        approach(test_axis, HOME_MM)?;
         test_axis.apply(quiet)?;
         let recording = virgin_curve::measure(test_axis, sine, progress)?;
         let gms = models::presliding(&recording, friction);

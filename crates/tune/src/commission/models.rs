@@ -28,7 +28,7 @@ use crate::identify::motor_constant::MotorConstant;
 use crate::identify::plant::{PlantFit, PlantFitSettings, Stiffness, fit_plant};
 use crate::identify::single_state::with_all_models;
 use crate::identify::static_friction::{
-    Exponent, FrictionFit, FrictionFitError, FrictionMap, fit_map,
+    Exponent, FrictionFit, FrictionFitError, FrictionMap, KnownViscous, fit_map,
 };
 use crate::identify::virgin_curve::{
     self, ASSUMED_ATTRACTION_V_S, GmsFit, Knots, VirginCurveError,
@@ -218,21 +218,41 @@ pub(super) fn sampled(rate_hz: f64) -> Form {
     }
 }
 
-/// Fits the static friction model to the runs of the map that moved evenly.
-pub(super) fn even_friction(map: &FrictionMap) -> Result<FrictionFit, FrictionFitError> {
-    fit_map(map, Exponent::Fixed(1.0))
+/// Relative error of the linear model's damping as a viscous friction: at one velocity part of it is the Stribeck curve.
+const VISCOUS_ERROR: f64 = 0.3;
+
+/// Fits the static friction model to the runs of the map that moved evenly, and to the damping of the linear model.
+pub(super) fn even_friction(
+    map: &FrictionMap,
+    plant: &PlantFit,
+) -> Result<FrictionFit, FrictionFitError> {
+    let PlantModel {
+        gain_mm_per_v_s2,
+        damping_per_s,
+        ..
+    } = plant.plant;
+    let deviation = (VISCOUS_ERROR * damping_per_s).hypot(plant.damping_error_per_s());
+    let known = KnownViscous {
+        value: damping_per_s / gain_mm_per_v_s2,
+        deviation: deviation / gain_mm_per_v_s2,
+    };
+    let is_known = damping_per_s > 0.0 && deviation.is_finite();
+    fit_map(map, Exponent::Fixed(1.0), is_known.then_some(known))
 }
 
 /// Fits the static friction model to the map. Where too few runs moved evenly the mean voltages of the others count, too: of an
 /// axis that sticks and slips they are what there is, and the trials judge what comes of them.
-pub(super) fn friction(map: &FrictionMap) -> Result<FrictionFit, CommissionError> {
-    match even_friction(map) {
+pub(super) fn friction(
+    map: &FrictionMap,
+    plant: &PlantFit,
+) -> Result<FrictionFit, CommissionError> {
+    match even_friction(map, plant) {
         Err(FrictionFitError::TooFewRuns { .. }) => {
             let mut all = map.clone();
             for run in &mut all.runs {
                 run.stick_slip = false;
             }
-            Ok(even_friction(&all)?)
+            Ok(even_friction(&all, plant)?)
         }
         found => Ok(found?),
     }
@@ -315,7 +335,7 @@ impl Measurements {
     ) -> Result<Commissioned, CommissionError> {
         let plant = plant(&self.response)?;
         let controller = controller(&plant, base, request, &self.motor, rate_hz)?;
-        let friction = friction(&self.map)?;
+        let friction = friction(&self.map, &plant)?;
         let gms = presliding(&self.presliding, &friction);
         let models = Models {
             plant,
@@ -515,8 +535,9 @@ mod tests {
         };
         map.runs
             .sort_by(|a, b| a.velocity_mm_s.total_cmp(&b.velocity_mm_s));
-        assert!(even_friction(&map).is_err());
-        let (coulomb_v, _) = friction(&map).unwrap().mean_levels_v();
+        let plant = StageSettings::simulated().axes[0].plant.unwrap();
+        assert!(even_friction(&map, &plant).is_err());
+        let (coulomb_v, _) = friction(&map, &plant).unwrap().mean_levels_v();
         assert!((coulomb_v - 0.1).abs() < 0.01, "{coulomb_v}");
     }
 

@@ -76,7 +76,7 @@ pub fn plan(info: &AxisInfo, request: &CommissionSettings) -> Vec<Planned> {
         lasts_s,
     });
     let friction = request.friction.fitted_to(info);
-    let (_, lasts_s) = friction.extent();
+    let lasts_s = friction.lasts_s(info);
     planned.push(Planned {
         step: "friction at constant velocities",
         within_mm: used_mm,

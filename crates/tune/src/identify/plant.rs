@@ -87,6 +87,11 @@ pub struct PlantFit {
 }
 
 impl PlantFit {
+    /// Standard deviation of B, 1/s; infinite of one that may be none.
+    pub fn damping_error_per_s(&self) -> f64 {
+        self.fit.standard_errors[1]
+    }
+
     /// The response of axis and modes at a frequency in rad/s, mm/V.
     pub fn response(&self, omega_rad_s: f64) -> Complex64 {
         self.plant.response(omega_rad_s) * mode::response_of(&self.modes, omega_rad_s)

@@ -22,8 +22,6 @@ const MAX_MOVES: usize = 4;
 const MAX_DISTANCE_SHARE: f64 = 0.02;
 /// Distance that is not worth a move, mm.
 const NEAR_MM: f64 = 0.05;
-/// Share of the travel by which a run may begin away from where it should.
-const ASTRAY: f64 = 0.04;
 /// Velocities of a move over the usual one: a soft controller, held by friction, lags by less where its integral has more time.
 const SLOWER: [f64; 3] = [1.0, 0.25, 0.0625];
 /// Error against the sense of the move over the one in it, from which on a move was not stopped because the axis lagged.
@@ -36,7 +34,16 @@ const LOOK_S: f64 = 0.01;
 /// # Errors
 /// A move that is stopped.
 pub fn approach(test_axis: &mut dyn TestAxis, target_mm: f64) -> Result<(), ExperimentError> {
-    let near_mm = NEAR_MM.max(MAX_DISTANCE_SHARE * test_axis.info().travel_mm);
+    approach_within(test_axis, target_mm, f64::INFINITY)
+}
+
+/// The same, to within a distance, mm, where it can be, and what counts as there.
+fn approach_within(
+    test_axis: &mut dyn TestAxis,
+    target_mm: f64,
+    within_mm: f64,
+) -> Result<(), ExperimentError> {
+    let near_mm = NEAR_MM.max(within_mm.min(MAX_DISTANCE_SHARE * test_axis.info().travel_mm));
     for _ in 1..MAX_MOVES {
         if approach_once(test_axis, target_mm)? < near_mm {
             return Ok(());
@@ -46,8 +53,8 @@ pub fn approach(test_axis: &mut dyn TestAxis, target_mm: f64) -> Result<(), Expe
     Ok(())
 }
 
-/// As [`approach`], if the last recording ended away from the target by more than a soft controller's usual lag: an axis that lags
-/// more one way than the other wanders off from run to run.
+/// As [`approach`], if there is no last recording or it ended more than `astray_mm` away from the target: an axis that lags more one way than the other
+/// wanders off from run to run.
 ///
 /// # Errors
 /// A move that is stopped.
@@ -55,11 +62,11 @@ pub fn approach_from(
     test_axis: &mut dyn TestAxis,
     last: Option<&Recording>,
     target_mm: f64,
+    astray_mm: f64,
 ) -> Result<(), ExperimentError> {
-    let astray_mm = ASTRAY * test_axis.info().travel_mm;
     match last.and_then(|recording| recording.position_mm.last()) {
-        Some(at_mm) if (at_mm - target_mm).abs() > astray_mm => approach(test_axis, target_mm),
-        _ => Ok(()),
+        Some(at_mm) if (at_mm - target_mm).abs() <= astray_mm => Ok(()),
+        _ => approach_within(test_axis, target_mm, astray_mm),
     }
 }
 

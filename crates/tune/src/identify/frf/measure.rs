@@ -101,6 +101,8 @@ pub enum FrfError {
     Experiment(#[from] ExperimentError),
 }
 
+/// Share of the travel by which a pass may begin away from where it should.
+const ASTRAY: f64 = 0.04;
 /// Time at constant velocity before the first block, s: transients have died away.
 const SETTLING_S: f64 = 0.7;
 /// The same where periods are short, s.
@@ -258,7 +260,8 @@ pub fn measure(
         if settings.two_sided {
             approach(test_axis, if forward { start_mm } else { -start_mm })?;
         } else if moves && forward {
-            approach_from(test_axis, recordings.last(), start_mm)?;
+            let astray_mm = ASTRAY * test_axis.info().travel_mm;
+            approach_from(test_axis, recordings.last(), start_mm, astray_mm)?;
         }
         let recording = test_axis.perform(&experiment, &mut |share| {
             progress((done + share * expected as f64) / settings.periods as f64);

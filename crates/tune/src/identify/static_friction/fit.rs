@@ -86,16 +86,35 @@ const MAX_RESIDUAL_RATIO: f64 = 0.7;
 const LEAST_LEVEL: f64 = 0.2;
 /// Largest level at rest over the largest voltage of any run that counts as measured: beyond, only the curve says so.
 const MAX_EXTRAPOLATION: f64 = 1.25;
+/// Viscous friction below which there is none, V s/mm.
+const LEAST_VISCOUS: f64 = 1e-9;
 /// An error of each mean that does not scatter within its run, over the voltage.
 const SYSTEMATIC_ERROR: f64 = 2e-4;
 
-/// Fits both directions.
+/// Viscous friction by another measurement, such as a linear model's `B / A`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KnownViscous {
+    /// Its value, V s/mm.
+    pub value: f64,
+    /// Its standard deviation, V s/mm.
+    pub deviation: f64,
+}
+
+/// Fits both directions, also to the viscous friction that is known otherwise: runs that are slow, few or uneven do not tell it from the end
+/// of the Stribeck curve.
 ///
 /// # Errors
 /// A map that cannot support the model, with the reason and what would.
-pub fn fit_map(map: &FrictionMap, exponent: Exponent) -> Result<FrictionFit, FrictionFitError> {
-    let positive = fit_direction(&map.direction(1.0), exponent, "positive")?;
-    let negative = fit_direction(&map.direction(-1.0), exponent, "negative")?;
+pub fn fit_map(
+    map: &FrictionMap,
+    exponent: Exponent,
+    viscous: Option<KnownViscous>,
+) -> Result<FrictionFit, FrictionFitError> {
+    let direction = |sign: f64, name: &'static str| {
+        fit_direction(&map.direction(sign), exponent, viscous, name)
+    };
+    let positive = direction(1.0, "positive")?;
+    let negative = direction(-1.0, "negative")?;
     let levels = [&positive, &negative].map(|direction| direction.model.curve.coulomb_v);
     Ok(FrictionFit {
         offset_v: 0.5 * (levels[1] - levels[0]),
@@ -120,6 +139,7 @@ fn model(values: &[f64], fixed: f64) -> StaticFriction {
 fn fit_direction(
     runs: &[FrictionRun],
     exponent: Exponent,
+    viscous: Option<KnownViscous>,
     direction: &'static str,
 ) -> Result<DirectionFit, FrictionFitError> {
     let (Some(slowest), Some(fastest), true) =
@@ -143,7 +163,8 @@ fn fit_direction(
         .fold(f64::INFINITY, f64::min);
     let most = runs.iter().map(|run| run.voltage_v).fold(0.0, f64::max);
     let (low, high) = (slowest.velocity_mm_s, fastest.velocity_mm_s);
-    let slope = ((fastest.voltage_v - least) / high).max(1e-9);
+    let slope = ((fastest.voltage_v - least) / high)
+        .max(viscous.map_or(LEAST_VISCOUS, |known| known.value));
     let mut parameters = vec![
         Parameter {
             name: "Fc",
@@ -177,7 +198,7 @@ fn fit_direction(
             1.0
         }
     };
-    let residuals = |values: &[f64]| -> Vec<f64> {
+    let misfits = |values: &[f64]| -> Vec<f64> {
         let model = model(values, fixed);
         runs.iter()
             .map(|run| {
@@ -187,10 +208,26 @@ fn fit_direction(
             .collect()
     };
     // Where Fs hardly differs from Fc, Vs means nothing, and a search for it has no end: where it stands will do.
-    let search = |parameters: &[Parameter]| match fit(parameters, Loss::Huber, residuals) {
-        Err(FitError::NotConverged) => fit_nearest(parameters, Loss::Huber, residuals),
-        found => found,
+    let search_by =
+        |parameters: &[Parameter], residuals: &(dyn Fn(&[f64]) -> Vec<f64> + Sync)| match fit(
+            parameters,
+            Loss::Huber,
+            residuals,
+        ) {
+            Err(FitError::NotConverged) => fit_nearest(parameters, Loss::Huber, residuals),
+            found => found,
+        };
+    let scatter = match viscous {
+        // By what the runs do not fit, they are less exact than they scatter.
+        Some(_) => search_by(&parameters, &misfits)?.residual_rms.max(1.0),
+        None => 1.0,
     };
+    let residuals = |values: &[f64]| -> Vec<f64> {
+        let runs = misfits(values).into_iter().map(|misfit| misfit / scatter);
+        let known = viscous.map(|known| (values[3] - known.value) / known.deviation);
+        runs.chain(known).collect()
+    };
+    let search = |parameters: &[Parameter]| search_by(parameters, &residuals);
     let mut fit = search(&parameters)?;
     if fit.values[0] + fit.values[1] > MAX_EXTRAPOLATION * most {
         parameters[1].bounds.1 = (MAX_EXTRAPOLATION - 1.0) * most;

@@ -1,4 +1,5 @@
-//! The experiment: moves at constant velocity over the same stretch, both ways.
+//! The experiment: moves at constant velocity through the same stretch, both ways. Friction differs from place to place: what was
+//! measured elsewhere at another velocity would look like friction that changes with the velocity.
 
 use quadrant_law::reference::{MotionSettings, PointToPointSettings};
 
@@ -20,10 +21,8 @@ pub struct StaticFrictionSettings {
     pub stretch_mm: f64,
     /// Runs over less than that; none where all go over it.
     pub short: Option<ShortRuns>,
-    /// Time after which a run's beginning is over, s: the slowest mode of the loop has died away.
+    /// Time after which a run's beginning is over, s: the slowest mode of the loop has died away. Fast runs take less where the travel is short.
     pub settling_s: f64,
-    /// Runs go through both sides of the travel: the axis stands at its negative end.
-    pub two_sided: bool,
     /// Acceleration of the moves, mm/s^2; of an axis that has less, its largest.
     pub acceleration_mm_s2: f64,
 }
@@ -45,8 +44,7 @@ impl Default for StaticFrictionSettings {
             count: 16,
             stretch_mm: 10.0,
             short: None,
-            settling_s: 2.5,
-            two_sided: false,
+            settling_s: 2.0,
             acceleration_mm_s2: 500.0,
         }
     }
@@ -60,8 +58,8 @@ pub enum StaticFrictionError {
     Setting(#[from] SettingError),
     /// A run does not fit into the travel.
     #[error(
-        "a run at {velocity_mm_s:.2} mm/s needs {needed_mm:.0} mm, and there are {travel_mm:.0} mm: lower the fastest velocity, the \
-         stretch or the settling time"
+        "a run at {velocity_mm_s:.2} mm/s needs {needed_mm:.0} mm, and there are {travel_mm:.0} mm: lower the fastest velocity or \
+         the stretch"
     )]
     Travel {
         velocity_mm_s: f64,
@@ -78,12 +76,16 @@ pub enum StaticFrictionError {
 const JERK_MM_S3: f64 = 2e4;
 /// Length of the stretch over a short travel.
 const STRETCH_SHARE: f64 = 0.4;
-/// Settling time on a short travel, s.
+/// Settling time at least, s, for which fast runs give up velocity.
 const SHORT_SETTLING_S: f64 = 0.6;
-/// Travel either way below which both sides are used, mm.
-const SHORT_MM: f64 = 60.0;
+/// Least length of a run before its stretch, mm: friction is that of sliding by then.
+const SLIDING_MM: f64 = 0.5;
+/// Share of the stretch by which a run may begin away from where it should.
+const ASTRAY: f64 = 0.1;
 /// Share of the largest velocity that a run takes at most.
 const MOST_VELOCITY: f64 = 0.6;
+/// What a length is rounded by, mm.
+const ROUNDING_MM: f64 = 1e-9;
 /// Samples of a run's recording at least: about one a count of the encoder at the slowest velocities.
 const SAMPLES: f64 = 20_000.0;
 /// Parts into which the stretch is cut to see its scatter.
@@ -96,21 +98,19 @@ const MAX_STICK_RATIO: f64 = 0.3;
 const MIN_SLIP_RATIO: f64 = 2.0;
 
 impl StaticFrictionSettings {
-    /// A shorter stretch, less settling and slower runs where travel or limits do not hold the fastest.
+    /// A shorter stretch and slower runs where travel or limits do not hold the fastest.
     #[must_use]
     pub fn fitted_to(mut self, axis: &AxisInfo) -> Self {
         self = self.within(axis);
-        self.two_sided = axis.travel_mm < SHORT_MM;
-        let room_mm = self.room_mm(axis.travel_mm);
+        let room_mm = room_mm(axis);
         if self.stretch_mm > STRETCH_SHARE * room_mm {
             self.stretch_mm = STRETCH_SHARE * room_mm;
             // Part of a short stretch shows too little.
             self.short = None;
-            self.settling_s = self.settling_s.min(SHORT_SETTLING_S);
         }
         let (slowest, fastest) = self.velocities_mm_s;
         let mut fastest = fastest.min(MOST_VELOCITY * axis.max_velocity_mm_s);
-        while self.length_mm(fastest) > room_mm && fastest > 2.0 * slowest {
+        while self.length_mm(fastest, room_mm) > room_mm && fastest > 2.0 * slowest {
             fastest *= 0.9;
         }
         self.velocities_mm_s = (slowest, fastest);
@@ -130,25 +130,10 @@ impl StaticFrictionSettings {
         velocity_mm_s / self.acceleration_mm_s2 + self.acceleration_mm_s2 / JERK_MM_S3
     }
 
-    /// Length of a run at most, mm.
-    fn room_mm(&self, travel_mm: f64) -> f64 {
-        Sides::of(self.two_sided).room_mm(travel_mm)
-    }
-
-    /// Position at which the axis stands before the first run, mm.
-    pub fn start_mm(&self, travel_mm: f64) -> f64 {
-        Sides::of(self.two_sided).start_mm(travel_mm)
-    }
-
-    /// The longest run, mm, and the time that all take, s.
-    pub fn extent(&self) -> (f64, f64) {
-        let longest_mm = self.velocities().map(|velocity| self.length_mm(velocity));
-        (longest_mm.fold(0.0, f64::max), self.lasts_s())
-    }
-
-    /// The time of all runs, both ways, s.
-    fn lasts_s(&self) -> f64 {
-        let duration = |velocity: f64| 2.0 * self.length_mm(velocity) / velocity;
+    /// The time of all runs on an axis, both ways, s.
+    pub fn lasts_s(&self, axis: &AxisInfo) -> f64 {
+        let room_mm = room_mm(axis);
+        let duration = |velocity: f64| 2.0 * self.length_mm(velocity, room_mm) / velocity;
         self.velocities().map(duration).sum()
     }
 
@@ -221,11 +206,28 @@ impl StaticFrictionSettings {
         self.stretch_mm.min(short)
     }
 
-    /// The length of a run, mm: up to speed, settling, the stretch, and down again.
-    fn length_mm(&self, velocity_mm_s: f64) -> f64 {
-        self.averaged_mm(velocity_mm_s)
-            + velocity_mm_s * (self.settling_s + 2.0 * self.ramp_s(velocity_mm_s))
+    /// Length of a run in some room until it is at speed and steady, and friction that of sliding, mm; it is as long behind the stretch, where the
+    /// run back begins.
+    fn approach_mm(&self, velocity_mm_s: f64, room_mm: f64) -> f64 {
+        // The mean velocity of a ramp is half of it.
+        let ramp_mm = 0.5 * velocity_mm_s * self.ramp_s(velocity_mm_s);
+        let settled_mm = |settling_s: f64| velocity_mm_s * settling_s + ramp_mm;
+        let most_mm = 0.5 * (room_mm - self.averaged_mm(velocity_mm_s));
+        settled_mm(self.settling_s)
+            .max(SLIDING_MM)
+            .min(most_mm)
+            .max(settled_mm(self.settling_s.min(SHORT_SETTLING_S)))
     }
+
+    /// The length of a run in some room, mm; the room's itself where that is too short.
+    fn length_mm(&self, velocity_mm_s: f64, room_mm: f64) -> f64 {
+        self.averaged_mm(velocity_mm_s) + 2.0 * self.approach_mm(velocity_mm_s, room_mm)
+    }
+}
+
+/// Length of a run at most, mm, about the middle of the travel: pre-sliding friction is measured there, too.
+fn room_mm(axis: &AxisInfo) -> f64 {
+    Sides::Both.room_mm(axis.travel_mm)
 }
 
 /// Measures the map on the axis under test, under the settings that are in force.
@@ -239,27 +241,27 @@ pub fn measure(
 ) -> Result<(FrictionMap, Vec<Recording>), StaticFrictionError> {
     settings.check()?;
     let settings = &settings.within(&test_axis.info());
-    let travel_mm = settings.room_mm(test_axis.info().travel_mm);
+    let room_mm = room_mm(&test_axis.info());
     for velocity_mm_s in settings.velocities() {
-        let needed_mm = settings.length_mm(velocity_mm_s);
-        if needed_mm > travel_mm {
+        let needed_mm = settings.length_mm(velocity_mm_s, room_mm);
+        if needed_mm > room_mm + ROUNDING_MM {
             return Err(StaticFrictionError::Travel {
                 velocity_mm_s,
                 needed_mm,
-                travel_mm,
+                travel_mm: room_mm,
             });
         }
     }
-    let all_s = settings.lasts_s();
+    let all_s = settings.lasts_s(&test_axis.info());
     let mut done_s = 0.0;
     let mut velocities_mm_s = Vec::new();
     let mut recordings: Vec<Recording> = Vec::new();
-    let start_mm = settings.start_mm(test_axis.info().travel_mm);
     for velocity_mm_s in settings.velocities() {
-        let length_mm = settings.length_mm(velocity_mm_s);
-        let begin_mm = start_mm + 0.5 * (settings.stretch_mm - settings.averaged_mm(velocity_mm_s));
-        for (direction, from_mm) in [(1.0, begin_mm), (-1.0, begin_mm + length_mm)] {
-            approach_from(test_axis, recordings.last(), from_mm)?;
+        let length_mm = settings.length_mm(velocity_mm_s, room_mm);
+        for direction in [1.0, -1.0] {
+            let from_mm = -0.5 * direction * length_mm;
+            let astray_mm = ASTRAY * settings.averaged_mm(velocity_mm_s);
+            approach_from(test_axis, recordings.last(), from_mm, astray_mm)?;
             let run_s = length_mm / velocity_mm_s;
             let recording = test_axis.perform(
                 &Experiment {
@@ -349,7 +351,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Evaluates a run at a velocity over its stretch, the last before it slows down, without the screw's ripple if that is known.
+/// Evaluates a run at a velocity over its stretch, in the middle of the travel, without the screw's ripple if that is known.
 fn evaluate(
     recording: &Recording,
     settings: &StaticFrictionSettings,
@@ -358,9 +360,8 @@ fn evaluate(
     ripple: Option<&Ripple<'_>>,
 ) -> Option<FrictionRun> {
     let direction = velocity_mm_s.signum();
-    let ramp_s = settings.ramp_s(velocity_mm_s.abs());
-    let end_mm = recording.reference_mm.last()? - 0.5 * velocity_mm_s * ramp_s;
-    let begin_mm = end_mm - direction * settings.averaged_mm(velocity_mm_s.abs());
+    let end_mm = 0.5 * direction * settings.averaged_mm(velocity_mm_s.abs());
+    let begin_mm = -end_mm;
     let passed = |limit_mm: f64| {
         recording
             .reference_mm

@@ -12,6 +12,6 @@ mod fit;
 mod map;
 mod measure;
 
-pub use fit::{DirectionFit, Exponent, FrictionFit, FrictionFitError, fit_map};
+pub use fit::{DirectionFit, Exponent, FrictionFit, FrictionFitError, KnownViscous, fit_map};
 pub use map::{FrictionMap, FrictionRun};
 pub use measure::{ShortRuns, StaticFrictionError, StaticFrictionSettings, measure};
