@@ -24,7 +24,6 @@ const FRICTION: StaticFrictionSettings = StaticFrictionSettings {
     stretch_mm: 5.0,
     short: None,
     settling_s: 0.3,
-    two_sided: false,
     acceleration_mm_s2: 500.0,
 };
 /// Largest relative error of the acceleration per volt that is found.

@@ -14,9 +14,9 @@ use super::ringing::Ringing;
 use super::velocity_mode;
 use super::verify::{Verification, VerifyError, verify};
 use crate::identify::motor_constant::{self, MotorConstantSettings};
-use crate::identify::plant::PlantFit;
 use crate::identify::static_friction::{
-    self, FrictionFit, FrictionFitError, FrictionMap, StaticFrictionError, StaticFrictionSettings,
+    self, FrictionFit, FrictionFitError, FrictionMap, KnownViscous, StaticFrictionError,
+    StaticFrictionSettings,
 };
 use crate::identify::virgin_curve::{self, GmsFit, VirginCurveError, VirginCurveSettings};
 use crate::record::Recording;
@@ -120,6 +120,7 @@ fn guarded(
         friction_v: 0.5 * (motor.directed_v[0] + motor.directed_v[1]),
         noise_mm: motor.noise_mm(),
     };
+    let viscous = models::viscous(&plant);
     let (mut tried, mut stopped) = (false, 0);
     let (map, recordings, friction) = loop {
         controller.put_into(&mut settings);
@@ -129,7 +130,7 @@ fn guarded(
             ..measuring.clone()
         });
         test_axis.apply(&measuring)?;
-        let measured = friction(test_axis, runs, &plant, &mut |share| {
+        let measured = friction(test_axis, runs, viscous, &mut |share| {
             report(watch, step, share);
         });
         let (map, recordings, found) = match measured {
@@ -272,20 +273,20 @@ type Friction = (
 fn friction(
     test_axis: &mut dyn TestAxis,
     mut runs: StaticFrictionSettings,
-    plant: &PlantFit,
+    viscous: Option<KnownViscous>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Friction, CommissionError> {
     loop {
         let (map, recordings) = static_friction::measure(test_axis, &runs, progress)?;
         let (slowest, fastest) = &mut runs.velocities_mm_s;
-        match models::even_friction(&map, plant) {
+        match models::even_friction(&map, viscous) {
             Err(FrictionFitError::TooFewRuns { .. } | FrictionFitError::Sign { .. })
                 if SLOWEST_VELOCITY_RAISE * *slowest < *fastest / SLOWEST_VELOCITY_RAISE =>
             {
                 *slowest *= SLOWEST_VELOCITY_RAISE;
             }
             _ => {
-                let found = models::friction(&map, plant);
+                let found = models::friction(&map, viscous);
                 return Ok((map, recordings, found));
             }
         }

@@ -221,11 +221,8 @@ pub(super) fn sampled(rate_hz: f64) -> Form {
 /// Relative error of the linear model's damping as a viscous friction: at one velocity part of it is the Stribeck curve.
 const VISCOUS_ERROR: f64 = 0.3;
 
-/// Fits the static friction model to the runs of the map that moved evenly, and to the damping of the linear model.
-pub(super) fn even_friction(
-    map: &FrictionMap,
-    plant: &PlantFit,
-) -> Result<FrictionFit, FrictionFitError> {
+/// The viscous friction that the linear model knows, if it knows one.
+pub(super) fn viscous(plant: &PlantFit) -> Option<KnownViscous> {
     let PlantModel {
         gain_mm_per_v_s2,
         damping_per_s,
@@ -236,23 +233,30 @@ pub(super) fn even_friction(
         value: damping_per_s / gain_mm_per_v_s2,
         deviation: deviation / gain_mm_per_v_s2,
     };
-    let is_known = damping_per_s > 0.0 && deviation.is_finite();
-    fit_map(map, Exponent::Fixed(1.0), is_known.then_some(known))
+    (damping_per_s > 0.0 && deviation.is_finite()).then_some(known)
+}
+
+/// Fits the static friction model to the runs of the map that moved evenly, and to what else is known.
+pub(super) fn even_friction(
+    map: &FrictionMap,
+    viscous: Option<KnownViscous>,
+) -> Result<FrictionFit, FrictionFitError> {
+    fit_map(map, Exponent::Fixed(1.0), viscous)
 }
 
 /// Fits the static friction model to the map. Where too few runs moved evenly the mean voltages of the others count, too: of an
 /// axis that sticks and slips they are what there is, and the trials judge what comes of them.
 pub(super) fn friction(
     map: &FrictionMap,
-    plant: &PlantFit,
+    viscous: Option<KnownViscous>,
 ) -> Result<FrictionFit, CommissionError> {
-    match even_friction(map, plant) {
+    match even_friction(map, viscous) {
         Err(FrictionFitError::TooFewRuns { .. }) => {
             let mut all = map.clone();
             for run in &mut all.runs {
                 run.stick_slip = false;
             }
-            Ok(even_friction(&all, plant)?)
+            Ok(even_friction(&all, viscous)?)
         }
         found => Ok(found?),
     }
@@ -335,7 +339,7 @@ impl Measurements {
     ) -> Result<Commissioned, CommissionError> {
         let plant = plant(&self.response)?;
         let controller = controller(&plant, base, request, &self.motor, rate_hz)?;
-        let friction = friction(&self.map, &plant)?;
+        let friction = friction(&self.map, viscous(&plant))?;
         let gms = presliding(&self.presliding, &friction);
         let models = Models {
             plant,
@@ -535,9 +539,8 @@ mod tests {
         };
         map.runs
             .sort_by(|a, b| a.velocity_mm_s.total_cmp(&b.velocity_mm_s));
-        let plant = StageSettings::simulated().axes[0].plant.unwrap();
-        assert!(even_friction(&map, &plant).is_err());
-        let (coulomb_v, _) = friction(&map, &plant).unwrap().mean_levels_v();
+        assert!(even_friction(&map, None).is_err());
+        let (coulomb_v, _) = friction(&map, None).unwrap().mean_levels_v();
         assert!((coulomb_v - 0.1).abs() < 0.01, "{coulomb_v}");
     }
 

@@ -351,7 +351,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Evaluates a run at a velocity over its stretch, in the middle of the travel, without the screw's ripple if that is known.
+/// Evaluates a run at a velocity over its stretch, the middle of it, without the screw's ripple if that is known.
 fn evaluate(
     recording: &Recording,
     settings: &StaticFrictionSettings,
@@ -360,8 +360,10 @@ fn evaluate(
     ripple: Option<&Ripple<'_>>,
 ) -> Option<FrictionRun> {
     let direction = velocity_mm_s.signum();
-    let end_mm = 0.5 * direction * settings.averaged_mm(velocity_mm_s.abs());
-    let begin_mm = -end_mm;
+    // That of the travel, but for what the axis stood beside its place.
+    let middle_mm = 0.5 * (recording.reference_mm.first()? + recording.reference_mm.last()?);
+    let half_mm = 0.5 * direction * settings.averaged_mm(velocity_mm_s.abs());
+    let (begin_mm, end_mm) = (middle_mm - half_mm, middle_mm + half_mm);
     let passed = |limit_mm: f64| {
         recording
             .reference_mm
