@@ -299,6 +299,23 @@ fn the_level_at_rest_is_near_what_was_measured_where_no_run_was_slow() {
     );
 }
 
+/// Fourteen runs both ways, the slowest at 0.1 mm/s, each faster than the one before by a ratio; `scatter` is relative.
+fn map_of(truth: &StaticFriction, ratio: f64, scatter: f64) -> FrictionMap {
+    let run = |index: i32| {
+        let speed = 0.1 * ratio.powi(index);
+        let scattered = 1.0 + scatter * (2.7 * f64::from(index)).sin();
+        [1.0, -1.0].map(|sign| FrictionRun {
+            velocity_mm_s: sign * speed,
+            voltage_v: sign * scattered * truth.friction_v(speed),
+            deviation_v: 1e-4,
+            stick_slip: false,
+        })
+    };
+    FrictionMap {
+        runs: (0..14).flat_map(run).collect(),
+    }
+}
+
 #[test]
 fn viscous_friction_that_slow_runs_do_not_show_is_that_of_the_linear_model() {
     const DAMPING: f64 = 2e-3;
@@ -312,19 +329,7 @@ fn viscous_friction_that_slow_runs_do_not_show_is_that_of_the_linear_model() {
         viscous_v_s_per_mm: DAMPING,
     };
     // Friction differs by a hundredth from run to run, as no model of the velocity says.
-    let run = |index: i32| {
-        let speed = 0.1 * 1.3_f64.powi(index);
-        let scattered = 1.0 + 0.01 * (2.7 * f64::from(index)).sin();
-        [1.0, -1.0].map(|sign| FrictionRun {
-            velocity_mm_s: sign * speed,
-            voltage_v: sign * scattered * truth.friction_v(speed),
-            deviation_v: 1e-4,
-            stick_slip: false,
-        })
-    };
-    let map = FrictionMap {
-        runs: (0..14).flat_map(run).collect(),
-    };
+    let map = map_of(&truth, 1.3, 0.01);
     let viscous = |known: Option<(f64, f64)>| {
         let known = known.map(|(ratio, deviation)| KnownViscous {
             value: ratio * DAMPING,
@@ -355,18 +360,7 @@ fn a_level_that_rises_with_the_speed_is_found_beside_a_known_viscous_friction() 
         },
         viscous_v_s_per_mm: DAMPING,
     };
-    let run = |index: i32| {
-        let speed = 0.1 * 1.5_f64.powi(index);
-        [1.0, -1.0].map(|sign| FrictionRun {
-            velocity_mm_s: sign * speed,
-            voltage_v: sign * truth.friction_v(speed),
-            deviation_v: 1e-4,
-            stick_slip: false,
-        })
-    };
-    let map = FrictionMap {
-        runs: (0..14).flat_map(run).collect(),
-    };
+    let map = map_of(&truth, 1.5, 0.0);
     let known = KnownViscous {
         value: DAMPING,
         deviation: 0.3 * DAMPING,
