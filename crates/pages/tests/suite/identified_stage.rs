@@ -5,7 +5,7 @@ use quadrant_law::friction::stribeck::StaticFriction;
 use quadrant_pages::compare::sine::run_configuration;
 use quadrant_pages::experiment::configuration::Configuration;
 use quadrant_pages::experiment::run_configuration::RunConfiguration;
-use quadrant_settings::StageSettings;
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::identified_stage::identified_settings;
 use quadrant_sim::metrics::Score;
 use quadrant_sim::plant::StageParameters;
@@ -13,6 +13,10 @@ use quadrant_sim::settings_file::SettingsFile;
 use quadrant_tune::commission::{CommissionSettings, commission};
 use quadrant_tune::test_axis::SimulatedTestAxis;
 use rayon::prelude::*;
+
+/// Largest difference of a value, and of the stiffness before sliding, between the committed settings and another measurement, over it.
+const FINE: f64 = 1e-3;
+const COARSE: f64 = 0.02;
 
 #[test]
 fn commissioning_the_axes_again_gives_the_committed_settings() {
@@ -31,42 +35,43 @@ fn commissioning_the_axes_again_gives_the_committed_settings() {
                 .unwrap()
                 .settings;
         });
-    for (again, committed) in again.stage.axes.iter().zip(&committed.stage.axes) {
-        let known = [again, committed].map(|axis| {
-            let (pid, nonlinear) = (axis.feedback.pid, axis.feedback.nonlinear.unwrap());
-            let friction = &axis.friction;
-            let ways = [friction.sliding.positive, friction.sliding.negative];
-            let levels = ways.map(|way| (way.curve.coulomb_v, way.curve.breakaway_v));
-            let sliding = levels
-                .into_iter()
-                .flat_map(|(coulomb_v, breakaway_v)| [(coulomb_v, FINE), (breakaway_v, FINE)]);
-            let other = ways.map(|way| (way.viscous_v_s_per_mm, FINE));
-            let own = [
-                (pid.kp_v_per_mm, FINE),
-                (pid.ki_v_per_mm_s, FINE),
-                (pid.kd_v_s_per_mm, FINE),
-                (nonlinear.rate_per_mm, FINE),
-                (friction.gms.stiffness_v_per_mm(), COARSE),
-                (axis.feedforward.gains.inertia_v_s2_per_mm, FINE),
-                (axis.feedforward.preview_s, FINE),
-            ];
-            own.into_iter()
-                .chain(sliding)
-                .chain(other)
-                .collect::<Vec<_>>()
-        });
-        for ((again, most), (committed, _)) in known[0].iter().zip(&known[1]) {
+    for (again, committed) in again.stage.axes.iter_mut().zip(&committed.stage.axes) {
+        for ((again, most), (committed, _)) in measured(again).iter().zip(&measured(committed)) {
             assert!(
                 (again / committed - 1.0).abs() < *most,
                 "{again} for {committed}"
             );
         }
+        (again.feedback, again.friction) = (committed.feedback.clone(), committed.friction.clone());
+        (again.feedforward, again.plant) = (committed.feedforward, committed.plant);
     }
+    assert_eq!(again.stage, committed.stage);
 }
 
-/// Largest difference of a value, and of the stiffness before sliding, between the committed settings and another measurement, over it.
-const FINE: f64 = 1e-3;
-const COARSE: f64 = 0.02;
+/// What a commissioning measures of an axis and makes of it, and how far it may be from another.
+fn measured(axis: &AxisSettings) -> Vec<(f64, f64)> {
+    let (pid, nonlinear) = (axis.feedback.pid, axis.feedback.nonlinear.unwrap());
+    let sliding = &axis.friction.sliding;
+    let ways = [sliding.positive, sliding.negative].into_iter();
+    let friction = ways.flat_map(|way| {
+        let curve = way.curve;
+        [curve.coulomb_v, curve.breakaway_v, way.viscous_v_s_per_mm]
+    });
+    let others = [
+        pid.kp_v_per_mm,
+        pid.ki_v_per_mm_s,
+        pid.kd_v_s_per_mm,
+        nonlinear.rate_per_mm,
+        axis.feedforward.gains.inertia_v_s2_per_mm,
+        axis.feedforward.preview_s,
+    ];
+    let stiffness_v_per_mm = axis.friction.gms.stiffness_v_per_mm();
+    let fine = others
+        .into_iter()
+        .chain(friction)
+        .map(|value| (value, FINE));
+    fine.chain([(stiffness_v_per_mm, COARSE)]).collect()
+}
 
 /// N-PID with the combined feedforward on the x axis with the identified model: largest and RMS tracking error, and glitch, mean over
 /// three velocities and three seeds, mm.

@@ -53,8 +53,8 @@ fn approach_within(
     Ok(())
 }
 
-/// As [`approach`], if there is no last recording or it ended more than `astray_mm` away from the target: an axis that lags more one way than the other
-/// wanders off from run to run.
+/// As [`approach`], if there is no last recording or it ended more than `astray_mm` away from the target: an axis that lags more one
+/// way than the other wanders off from run to run.
 ///
 /// # Errors
 /// A move that is stopped.

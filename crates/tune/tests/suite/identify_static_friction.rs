@@ -299,6 +299,22 @@ fn the_level_at_rest_is_near_what_was_measured_where_no_run_was_slow() {
     );
 }
 
+/// Viscous friction of the models whose maps follow, V s/mm.
+const DAMPING: f64 = 2e-3;
+
+/// Friction that goes from one level to another with a speed, V and mm/s, and viscous friction.
+fn damped(coulomb_v: f64, breakaway_v: f64, stribeck_velocity_mm_s: f64) -> StaticFriction {
+    StaticFriction {
+        curve: StribeckCurve {
+            coulomb_v,
+            breakaway_v,
+            stribeck_velocity_mm_s,
+            exponent: 1.0,
+        },
+        viscous_v_s_per_mm: DAMPING,
+    }
+}
+
 /// Fourteen runs both ways, the slowest at 0.1 mm/s, each faster than the one before by a ratio; `scatter` is relative.
 fn map_of(truth: &StaticFriction, ratio: f64, scatter: f64) -> FrictionMap {
     let run = |index: i32| {
@@ -318,16 +334,7 @@ fn map_of(truth: &StaticFriction, ratio: f64, scatter: f64) -> FrictionMap {
 
 #[test]
 fn viscous_friction_that_slow_runs_do_not_show_is_that_of_the_linear_model() {
-    const DAMPING: f64 = 2e-3;
-    let truth = StaticFriction {
-        curve: StribeckCurve {
-            coulomb_v: 0.07,
-            breakaway_v: 0.10,
-            stribeck_velocity_mm_s: 3.0,
-            exponent: 1.0,
-        },
-        viscous_v_s_per_mm: DAMPING,
-    };
+    let truth = damped(0.07, 0.10, 3.0);
     // Friction differs by a hundredth from run to run, as no model of the velocity says.
     let map = map_of(&truth, 1.3, 0.01);
     let viscous = |known: Option<(f64, f64)>| {
@@ -350,16 +357,7 @@ fn viscous_friction_that_slow_runs_do_not_show_is_that_of_the_linear_model() {
 
 #[test]
 fn a_level_that_rises_with_the_speed_is_found_beside_a_known_viscous_friction() {
-    const DAMPING: f64 = 2e-3;
-    let truth = StaticFriction {
-        curve: StribeckCurve {
-            coulomb_v: 0.12,
-            breakaway_v: 0.08,
-            stribeck_velocity_mm_s: 4.0,
-            exponent: 1.0,
-        },
-        viscous_v_s_per_mm: DAMPING,
-    };
+    let truth = damped(0.12, 0.08, 4.0);
     let map = map_of(&truth, 1.5, 0.0);
     let known = KnownViscous {
         value: DAMPING,

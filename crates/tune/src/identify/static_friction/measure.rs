@@ -84,7 +84,7 @@ const SLIDING_MM: f64 = 0.5;
 const ASTRAY: f64 = 0.1;
 /// Share of the largest velocity that a run takes at most.
 const MOST_VELOCITY: f64 = 0.6;
-/// What a length is rounded by, mm.
+/// Rounding of a length, mm.
 const ROUNDING_MM: f64 = 1e-9;
 /// Samples of a run's recording at least: about one a count of the encoder at the slowest velocities.
 const SAMPLES: f64 = 20_000.0;
