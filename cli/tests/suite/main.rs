@@ -20,6 +20,7 @@ mod kept_settings;
 mod new;
 mod new_from_linuxcnc;
 mod own_stage;
+mod pages;
 mod part_program;
 mod plot;
 mod record_bad_input;

@@ -86,6 +86,8 @@ pub struct Imperfections {
     pub friction_variation: f64,
     /// Length over which that repeats, mm; above zero where the amplitude is.
     pub friction_period_mm: f64,
+    /// Position at which it is that of the mean and grows, mm.
+    pub friction_from_mm: f64,
 }
 
 impl Imperfections {
@@ -101,7 +103,8 @@ impl Imperfections {
     /// Friction at a position over its mean.
     pub fn friction_factor(&self, position_mm: f64) -> f64 {
         if self.friction_variation > 0.0 {
-            1.0 + self.friction_variation * (TAU * position_mm / self.friction_period_mm).sin()
+            let periods = (position_mm - self.friction_from_mm) / self.friction_period_mm;
+            1.0 + self.friction_variation * (TAU * periods).sin()
         } else {
             1.0
         }

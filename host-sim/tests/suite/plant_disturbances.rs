@@ -219,19 +219,23 @@ fn friction_along_the_travel_is_its_mean_where_it_should_be() {
     let truth = ideal().with_imperfection(|it| {
         it.friction_variation = 0.2;
         it.friction_period_mm = 40.0;
+        it.friction_from_mm = 5.0;
     });
     let mut axis = SimulatedAxis::new(truth.clone(), RATE_HZ, 1);
-    let mut highest = 0.0_f64;
+    let (mut highest, mut highest_at_mm) = (0.0_f64, 0.0);
     let mut lowest = f64::INFINITY;
     while axis.position_mm() < 80.0 {
         axis.step(code(0.3), true);
         if axis.position_mm() > 40.0 {
             let viscous = truth.friction.positive.viscous_v_s_per_mm * axis.velocity_mm_s();
             let level = axis.friction_v() - viscous;
-            highest = highest.max(level);
+            if level > highest {
+                (highest, highest_at_mm) = (level, axis.position_mm());
+            }
             lowest = lowest.min(level);
         }
     }
+    assert!((highest_at_mm - 55.0_f64).abs() < 0.5, "{highest_at_mm}");
     let coulomb = truth.friction.positive.curve.coulomb_v;
     assert!((highest / coulomb - 1.2).abs() < 0.01, "{highest}");
     assert!((lowest / coulomb - 0.8).abs() < 0.01, "{lowest}");

@@ -147,6 +147,9 @@ impl RandomAxis {
             let holding_v = (1.0 - f64::abs(asymmetry)) * level_v.min(breakaway_v);
             parameters.imperfections.gravity_v = holding_v * random.random_range(-0.6..0.6);
         }
+        // Where the middle of the travel is in it.
+        parameters.imperfections.friction_from_mm =
+            parameters.imperfections.friction_period_mm * random.random::<f64>();
         Self {
             warming,
             seed,

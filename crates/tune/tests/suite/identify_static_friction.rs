@@ -392,6 +392,27 @@ fn runs_keep_to_the_travel_and_begin_about_its_middle() {
 }
 
 #[test]
+fn slow_runs_are_shorter_on_a_short_travel_too() {
+    let axis = SimulatedTestAxis::new(0, StageParameters::real().axes[0].clone(), 1);
+    let minutes = |settings: StaticFrictionSettings, travel_mm: f64| {
+        let info = AxisInfo {
+            travel_mm,
+            ..axis.info()
+        };
+        settings.fitted_to(&info).lasts_s(&info) / 60.0
+    };
+    for travel_mm in [10.0, 18.0, 100.0] {
+        let (all, with_short) = (minutes(runs(), travel_mm), minutes(short_runs(), travel_mm));
+        assert!(
+            with_short < 0.6 * all,
+            "{travel_mm} mm: {with_short} min for {all}"
+        );
+    }
+    // There is no part of these that would show enough.
+    assert!(minutes(short_runs(), 1.5) > 0.99 * minutes(runs(), 1.5));
+}
+
+#[test]
 fn a_short_travel_takes_from_the_time_before_a_run_first_and_then_from_the_velocity() {
     let axis = SimulatedTestAxis::new(0, StageParameters::real().axes[0].clone(), 1);
     let fitted = |travel_mm: f64| {

@@ -21,16 +21,19 @@ use super::variants::{feeding_beyond, feeding_from, with_friction};
 enum Remedy {
     /// No friction fed forward on motions up to a velocity, mm/s.
     From(f64),
-    /// The same without the nonlinear gain: on such motions it is the PID.
+    /// No nonlinear gain: it may be the harm where no friction is fed forward.
+    Linear,
+    /// Neither up to a velocity, mm/s: on such motions it is the PID.
     LinearFrom(f64),
     /// A share of the friction on every motion.
     Share(f64),
 }
 
 /// Remedies in the order in which they are tried: the first that is not worse than the PID on any sine is chosen.
-const REMEDIES: [Remedy; 4] = [
+const REMEDIES: [Remedy; 5] = [
     Remedy::From(0.4),
     Remedy::From(0.8),
+    Remedy::Linear,
     Remedy::From(FROM_MM_S),
     Remedy::LinearFrom(FROM_MM_S),
 ];
@@ -40,7 +43,8 @@ const REMEDIES: [Remedy; 4] = [
 const MAX_REMEDY_RATIO: f64 = 1.1;
 /// Velocities up to which no friction is fed forward where it is worse than the PID on usual sines, mm/s.
 const FAST_MM_S: [f64; 2] = [FROM_MM_S, 5.0];
-/// Remedies that are tried where the whole of a law is far worse than the PID when small, and no other remedy is not worse at all.
+/// Remedies that are tried where the whole of a law is far worse than the PID when small, and no other remedy is not worse at all: on the law
+/// beyond the short strokes on which it was refused.
 const LESS: [Remedy; 4] = [
     Remedy::LinearFrom(FAST_MM_S[0]),
     Remedy::LinearFrom(FAST_MM_S[1]),
@@ -55,6 +59,19 @@ const MOST_STROKE_MM: f64 = 0.12;
 /// Parts of such a law's name before and after the length.
 const STROKES: &str = ", strokes from ";
 const ON: &str = " mm on";
+
+/// Name of a law without its nonlinear gain.
+fn linear_name(name: &str) -> String {
+    name.replacen("N-PID", "PID", 1)
+}
+
+/// Settings under the feedback of the PID alone.
+fn linear(settings: &AxisSettings, pid: &AxisSettings) -> AxisSettings {
+    AxisSettings {
+        feedback: pid.feedback.clone(),
+        ..settings.clone()
+    }
+}
 
 impl Remedy {
     /// The same for a law that may have no nonlinear gain to lose.
@@ -75,16 +92,13 @@ impl Remedy {
                 format!("{name}, from {from_mm_s} mm/s"),
                 feeding_from(&law.settings, from_mm_s),
             ),
-            Self::LinearFrom(_) if law.settings.feedback == pid.feedback => return None,
+            Self::Linear | Self::LinearFrom(_) if law.settings.feedback == pid.feedback => {
+                return None;
+            }
+            Self::Linear => (linear_name(name), linear(&law.settings, pid)),
             Self::LinearFrom(from_mm_s) => (
-                format!(
-                    "{}, from {from_mm_s} mm/s",
-                    name.replacen("N-PID", "PID", 1)
-                ),
-                AxisSettings {
-                    feedback: pid.feedback.clone(),
-                    ..feeding_from(&law.settings, from_mm_s)
-                },
+                format!("{}, from {from_mm_s} mm/s", linear_name(name)),
+                linear(&feeding_from(&law.settings, from_mm_s), pid),
             ),
             Self::Share(share) => (
                 format!("{name} x {share:.2}"),
@@ -132,15 +146,15 @@ impl Trials<'_, '_> {
         if self.errors_unless_far(&mut whole)?.is_some() {
             return Ok(chosen);
         }
-        self.laws[chosen] = whole.clone();
-        self.less_of(&whole)
+        self.laws[chosen] = whole;
+        self.less_of(&law)
     }
 
     /// Index of a law with less of another's friction that is not far worse than the PID on any small slow motion; the PID's without one.
-    fn less_of(&mut self, whole: &LawResult) -> Result<usize, VerifyError> {
+    fn less_of(&mut self, law: &LawResult) -> Result<usize, VerifyError> {
         for remedy in LESS {
-            let remedy = remedy.suiting(whole, &self.pid);
-            let Some(mut found) = self.begin_remedy(remedy, whole) else {
+            let remedy = remedy.suiting(law, &self.pid);
+            let Some(mut found) = self.begin_remedy(remedy, law) else {
                 continue;
             };
             let Some(errors_mm) = self.errors_unless_far(&mut found)? else {
@@ -247,7 +261,8 @@ impl Trials<'_, '_> {
         // Where it is the PID, what differs is chance.
         let differing: Vec<usize> = (0..all)
             .filter(|&index| {
-                !self.is_pid_at(&found.settings, self.bench.sines[index].velocity_mm_s)
+                let sine = &self.bench.sines[index];
+                !self.is_pid_on(&found.settings, 2.0 * sine.amplitude_mm, sine.velocity_mm_s)
             })
             .collect();
         let (worst, _) = found

@@ -118,10 +118,18 @@ impl Trials<'_, '_> {
         Ok(())
     }
 
-    /// True of settings that are the PID's up to a velocity, mm/s.
-    pub(super) fn is_pid_at(&self, settings: &AxisSettings, velocity_mm_s: f64) -> bool {
-        let is_linear = settings.feedback == self.pid.feedback;
-        is_linear && velocity_mm_s <= settings.feedforward.from_mm_s
+    /// True of settings that are the PID's on a motion of some stroke, mm, and largest velocity, mm/s: what differs is chance.
+    pub(super) fn is_pid_on(
+        &self,
+        settings: &AxisSettings,
+        stroke_mm: f64,
+        velocity_mm_s: f64,
+    ) -> bool {
+        let (is_linear, fed) = (
+            settings.feedback == self.pid.feedback,
+            &settings.feedforward,
+        );
+        is_linear && (velocity_mm_s <= fed.from_mm_s || stroke_mm < fed.from_mm)
     }
 
     /// True if a law's largest error on any small motion exceeds both the PID's and that of another one by more than chance, or it is stopped.
@@ -179,7 +187,10 @@ impl Trials<'_, '_> {
     ) -> Result<Option<Worse>, VerifyError> {
         let all = self.bench.small_motions;
         let end = range.end;
-        let differs = |index: &usize| !self.is_pid_at(&law.settings, all[*index].velocity_mm_s());
+        let differs = |index: &usize| {
+            let motion = all[*index];
+            !self.is_pid_on(&law.settings, motion.stroke_mm(), motion.velocity_mm_s())
+        };
         let indices: Vec<usize> = range.filter(differs).collect();
         if law.stopped.is_some() || indices.is_empty() {
             return Ok(None);

@@ -76,6 +76,8 @@ pub enum StaticFrictionError {
 const JERK_MM_S3: f64 = 2e4;
 /// Length of the stretch over a short travel.
 const STRETCH_SHARE: f64 = 0.4;
+/// Stretch of short runs at least, mm: part of a short one would show too little.
+const LEAST_SHORT_MM: f64 = 1.0;
 /// Settling time at least, s, for which fast runs give up velocity.
 const SHORT_SETTLING_S: f64 = 0.6;
 /// Least length of a run before its stretch, mm: friction is that of sliding by then.
@@ -103,11 +105,13 @@ impl StaticFrictionSettings {
     pub fn fitted_to(mut self, axis: &AxisInfo) -> Self {
         self = self.within(axis);
         let room_mm = room_mm(axis);
-        if self.stretch_mm > STRETCH_SHARE * room_mm {
-            self.stretch_mm = STRETCH_SHARE * room_mm;
-            // Part of a short stretch shows too little.
-            self.short = None;
-        }
+        let stretch_mm = self.stretch_mm.min(STRETCH_SHARE * room_mm);
+        let shorter = stretch_mm / self.stretch_mm;
+        self.stretch_mm = stretch_mm;
+        self.short = self.short.map(|short| ShortRuns {
+            stretch_mm: (shorter * short.stretch_mm).max(LEAST_SHORT_MM),
+            ..short
+        });
         let (slowest, fastest) = self.velocities_mm_s;
         let mut fastest = fastest.min(MOST_VELOCITY * axis.max_velocity_mm_s);
         while self.length_mm(fastest, room_mm) > room_mm && fastest > 2.0 * slowest {
