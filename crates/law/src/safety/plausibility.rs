@@ -532,11 +532,11 @@ impl Plausibility {
     #[inline(always)]
     fn beyond_sliding(&self, state: &PlausibilityState) -> i32 {
         let Heading { sense, level, .. } = state.heading;
-        // A load may have moved the axis against its law.
-        let forth = state.anchor.max(level);
-        let back = state.anchor.min(level);
-        let forth = state.force.saturating_sub(forth).saturating_sub(self.stuck);
-        let back = state.force.saturating_sub(back).saturating_add(self.stuck);
+        // A load may have moved the axis against its law, and one that slips may do so while its law brakes it: friction holds it as before.
+        let forth = state.anchor.max(level).saturating_add(self.stuck);
+        let back = state.anchor.min(level).saturating_sub(self.stuck);
+        let forth = state.force.saturating_sub(forth.max(self.eased));
+        let back = state.force.saturating_sub(back.min(-self.eased));
         match sense {
             1 => forth.max(0),
             -1 => back.min(0),

@@ -587,6 +587,18 @@ fn found_in_jog(
     model: &PlausibilityModel,
     jog_mm_s: f64,
     growth_v_per_s: f64,
+    motion: impl FnMut(f64) -> f64,
+) -> Option<f64> {
+    let slides_v = SLIDES_V * jog_mm_s.signum();
+    found_after(model, jog_mm_s, slides_v, growth_v_per_s, motion)
+}
+
+/// The same of an axis that slides at another voltage.
+fn found_after(
+    model: &PlausibilityModel,
+    jog_mm_s: f64,
+    slides_v: f64,
+    growth_v_per_s: f64,
     mut motion: impl FnMut(f64) -> f64,
 ) -> Option<f64> {
     let axis = Plausibility::new(model, AMPLIFIERS[0], COUNT_MM, PERIOD_S);
@@ -595,7 +607,7 @@ fn found_in_jog(
     let mut before_mm = 0.0;
     for tick in 1..23_000_u32 {
         let since_s = f64::from(tick) * PERIOD_S - SLIDES_S;
-        let volts = SLIDES_V * jog_mm_s.signum() + growth_v_per_s * since_s.max(0.0);
+        let volts = slides_v + growth_v_per_s * since_s.max(0.0);
         sum = sum.wrapping_add((volts * AMPLIFIERS[0].per_volt).round() as i32);
         let position_mm = if since_s < 0.0 {
             jog_mm_s * (SLIDES_S + since_s)
@@ -764,6 +776,27 @@ fn an_axis_that_slid_and_stands_takes_up_little_more_in_that_sense() {
         found_in_jog(&model, -1.0, -2.0, stands),
         Some(forth),
     );
+}
+
+#[test]
+fn an_axis_that_slipped_while_its_law_braked_it_is_held_by_friction_as_before() {
+    let model = PlausibilityModel {
+        stuck_v: 0.1,
+        held_v: NEVER_V,
+        eased_v: 0.3,
+        regained_v: 0.0,
+        ..model()
+    };
+    let growth_v_per_s = 2.0;
+    let reaches_s = (model.eased_v + SLIDES_V) / growth_v_per_s;
+    for sense in [1.0, -1.0] {
+        let (slides_v, growth) = (-sense * SLIDES_V, sense * growth_v_per_s);
+        let found = found_after(&model, sense, slides_v, growth, |_| 0.0).expect("found");
+        assert!(
+            (reaches_s..reaches_s + 0.1).contains(&found),
+            "{sense}: {found} {reaches_s}"
+        );
+    }
 }
 
 #[test]

@@ -273,6 +273,9 @@ pub(super) fn presliding(
     identify_elements(recording, &friction.models())
 }
 
+/// Breakaway over what moved the axis that is believed while friction is measured: that of an axis that sticks rises while it rests.
+const MOST_BREAKAWAY: f64 = 2.0;
+
 /// Friction while it is measured, with the voltages that moved the axis in positive and negative direction: nothing is known of its
 /// springs, and what an encoder must show is not more than stiff ones let through.
 pub(super) fn rough_friction(
@@ -280,8 +283,9 @@ pub(super) fn rough_friction(
     plant: &PlantModel,
     rate_hz: f64,
 ) -> FrictionSettings {
-    let sliding = rough_sliding(directed_v);
-    let spring = one_spring(directed_v[0].max(directed_v[1]), STIFF_RANGE_MM);
+    let most_v = directed_v.map(|friction_v| MOST_BREAKAWAY * friction_v);
+    let sliding = rough_sliding(most_v);
+    let spring = one_spring(most_v[0].max(most_v[1]), STIFF_RANGE_MM);
     let gms = resolved(spring, &sliding, plant, rate_hz);
     with_all_models(sliding, gms)
 }

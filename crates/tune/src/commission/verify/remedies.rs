@@ -44,7 +44,7 @@ const MAX_REMEDY_RATIO: f64 = 1.1;
 /// Velocities up to which no friction is fed forward where it is worse than the PID on usual sines, mm/s.
 const FAST_MM_S: [f64; 2] = [FROM_MM_S, 5.0];
 /// Remedies that are tried where the whole of a law is far worse than the PID when small, and no other remedy is not worse at all: on the law
-/// beyond the short strokes on which it was refused.
+/// beyond short strokes.
 const LESS: [Remedy; 4] = [
     Remedy::LinearFrom(FAST_MM_S[0]),
     Remedy::LinearFrom(FAST_MM_S[1]),
@@ -147,7 +147,8 @@ impl Trials<'_, '_> {
             return Ok(chosen);
         }
         self.laws[chosen] = whole;
-        self.less_of(&law)
+        let beyond = self.beyond(&law, MOST_STROKE_MM).unwrap_or(law);
+        self.less_of(&beyond)
     }
 
     /// Index of a law with less of another's friction that is not far worse than the PID on any small slow motion; the PID's without one.
@@ -160,7 +161,8 @@ impl Trials<'_, '_> {
             let Some(errors_mm) = self.errors_unless_far(&mut found)? else {
                 continue;
             };
-            let worse = self.worst_when_small(&errors_mm).map(|worse| Refused {
+            let worse = self.worst_when_small(&found.settings, &errors_mm);
+            let worse = worse.map(|worse| Refused {
                 law: found.law.clone(),
                 factor: 1.0,
                 worse: Some(worse),
@@ -211,7 +213,11 @@ impl Trials<'_, '_> {
     /// longer that it does on them what it did.
     fn beyond_refused_stroke(&self, law: &LawResult) -> Option<LawResult> {
         let motion = self.refused.last()?.worse?.motion;
-        let from_mm = STROKE_ROOM * motion.stroke_mm();
+        self.beyond(law, STROKE_ROOM * motion.stroke_mm())
+    }
+
+    /// A law that feeds no friction forward on strokes up to a length, mm, if that is a short one and changes the law.
+    fn beyond(&self, law: &LawResult, from_mm: f64) -> Option<LawResult> {
         let is_longer = |usual: &SineTest| usual.amplitude_mm >= from_mm;
         let tries = from_mm > law.settings.feedforward.from_mm
             && from_mm <= MOST_STROKE_MM

@@ -67,8 +67,12 @@ impl Trials<'_, '_> {
         let settings = law.settings.clone();
         let least_mm = FAR_COUNTS * settings.encoder.resolution_mm;
         let pid_when_small_mm = &self.pid_when_small_mm;
+        let differs = motions
+            .iter()
+            .map(|motion| !self.is_pid_on(&settings, motion.stroke_mm(), motion.velocity_mm_s()));
+        let differs: Vec<bool> = differs.collect();
         let is_far = |index: usize, own_mm: f64| {
-            let pid_mm = pid_when_small_mm.get(index);
+            let pid_mm = pid_when_small_mm.get(index).filter(|_| differs[index]);
             pid_mm.is_some_and(|pid_mm| own_mm > FAR_RATIO * pid_mm && own_mm - pid_mm > least_mm)
         };
         match self.bench.run_small(law, &settings, motions, is_far) {
@@ -83,7 +87,11 @@ impl Trials<'_, '_> {
     }
 
     /// The motion on which errors that were measured on all small ones are worst beside the PID's, if they are worse on any.
-    pub(super) fn worst_when_small(&self, errors_mm: &[f64]) -> Option<Worse> {
+    pub(super) fn worst_when_small(
+        &self,
+        settings: &AxisSettings,
+        errors_mm: &[f64],
+    ) -> Option<Worse> {
         let count_mm = self.pid.encoder.resolution_mm;
         let pairs = errors_mm.iter().zip(&self.pid_when_small_mm);
         let worse = self.bench.small_motions.iter().zip(pairs);
@@ -93,7 +101,11 @@ impl Trials<'_, '_> {
                 largest_mm: *largest_mm,
                 pid_mm: *pid_mm,
             })
-            .filter(|it| is_worse(it.largest_mm, it.pid_mm, count_mm))
+            .filter(|it| {
+                let motion = it.motion;
+                is_worse(it.largest_mm, it.pid_mm, count_mm)
+                    && !self.is_pid_on(settings, motion.stroke_mm(), motion.velocity_mm_s())
+            })
             .max_by(|a, b| a.ratio().total_cmp(&b.ratio()))
     }
 
