@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn each_remedy_feeds_less_friction_forward_when_slow_and_as_much_when_fast() {
+    fn each_remedy_is_linear_or_feeds_less_friction_forward_when_slow_and_as_much_when_fast() {
         let law = LawResult {
             law: "a law".to_owned(),
             scores: Vec::new(),
@@ -326,7 +326,8 @@ mod tests {
         };
         for remedy in REMEDIES {
             let (name, settings) = remedy.of(&law, &pid).unwrap();
-            assert!(settings.feedforward.from_mm_s >= 0.4, "{name}");
+            let is_linear = settings.feedback == pid.feedback;
+            assert!(is_linear || settings.feedforward.from_mm_s >= 0.4, "{name}");
             assert_eq!(settings.friction, law.settings.friction);
             assert_eq!(settings.feedforward.gains, law.settings.feedforward.gains);
         }
@@ -334,6 +335,7 @@ mod tests {
             settings: pid.clone(),
             ..law
         };
+        assert_eq!(Remedy::Linear.of(&linear, &pid), None);
         let remedy = Remedy::LinearFrom(1.6);
         assert_eq!(remedy.of(&linear, &pid), None);
         assert!(remedy.suiting(&linear, &pid).of(&linear, &pid).is_some());
