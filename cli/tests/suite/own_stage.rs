@@ -1,6 +1,6 @@
 //! A simulated stage of one's own: what its axis would gain, and the way from its file to a machine that is moved.
 
-use crate::command;
+use crate::command::{self, words};
 use std::fs;
 use std::path::Path;
 
@@ -16,11 +16,6 @@ fn folder_with(name: &str, text: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join(name), text).unwrap();
     folder
-}
-
-/// The text without its lines' ends.
-fn words(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 #[test]

@@ -1,16 +1,11 @@
-//! What pages of the documentation quote of a commissioning.
+//! Lines of a commissioning that pages of the documentation quote.
 
 use std::fs;
 use std::path::Path;
 
-use crate::command;
+use crate::command::{self, words};
 
 const DOCS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs");
-
-/// The text without its lines' ends.
-fn words(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
 
 /// The number before some words, rounded.
 fn number_before(text: &str, unit: &str) -> Option<f64> {

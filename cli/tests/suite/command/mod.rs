@@ -56,3 +56,8 @@ pub(crate) fn play(folder: &Path, arguments: &[&str], script: &str) -> Output {
     writer.join().unwrap();
     output
 }
+
+/// Returns a text without its lines' ends.
+pub(crate) fn words(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}

@@ -48,7 +48,7 @@ fn commissioning_the_axes_again_gives_the_committed_settings() {
     assert_eq!(again.stage, committed.stage);
 }
 
-/// What a commissioning measures of an axis and makes of it, and how far it may be from another.
+/// Values that a commissioning measures of an axis or makes of them, each with its largest difference from another, over it.
 fn measured(axis: &AxisSettings) -> Vec<(f64, f64)> {
     let (pid, nonlinear) = (axis.feedback.pid, axis.feedback.nonlinear.unwrap());
     let sliding = &axis.friction.sliding;
