@@ -363,10 +363,14 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         state.idle = !acts;
     }
 
-    /// Lets the pre-sliding model carry `voltage` more, V, as far as friction can be; returns by how much the output grows, V.
+    /// Lets the pre-sliding model carry `voltage` more, V, as far as friction can be; returns by how much the output grows, V: by what the
+    /// integral is to lose. The static model carries nothing at rest; its level, which is about to begin, stands for as much.
     #[cold]
     #[inline(never)]
     pub(crate) fn take_over(&self, state: &mut FeedforwardState<S, N>, voltage: S) -> S {
+        if let Presliding::Static(_) = self.presliding {
+            return voltage.within(self.most.scale(self.coulomb_gain));
+        }
         if self.presliding_gain == S::Gain::default() {
             return S::ZERO;
         }

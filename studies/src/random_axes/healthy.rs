@@ -30,7 +30,7 @@ const MOVES: usize = 12;
 /// Share of the acceleration that the output limit allows beyond friction: the rest is the loop's.
 const MOST_EFFORT: f64 = 0.6;
 /// Share of the velocity limit: beyond the limit itself the experiment is stopped, and an axis overshoots.
-const MOST_VELOCITY: f64 = 0.95;
+const MOST_VELOCITY: f64 = 0.9;
 /// Rest before a knock, its duration, and the rest after it, s.
 const KNOCK_S: (f64, f64, f64) = (0.2, 4e-3, 3.0);
 /// Voltages of a knock over friction: the next one where the axis may not be as fast as one makes it.
@@ -132,6 +132,7 @@ fn to_and_fro(
                 injection_v: Vec::new(),
                 decimation: 10,
                 time_limit_s: 120.0,
+                goes_on: true,
             },
             &mut |_| {},
         );
@@ -178,6 +179,7 @@ fn knocked(
             injection_v: vec![0.0; samples(before_s + knock_s + after_s)],
             decimation: 1,
             time_limit_s: 10.0,
+            goes_on: false,
         };
         let recording = axis.perform(&held, &mut |_| {})?;
         let tenth = samples(0.1);

@@ -502,6 +502,7 @@ mod tests {
             injection_v: vec![0.3; ticks],
             decimation: 1,
             time_limit_s: 1.0,
+            goes_on: false,
         }
     }
 

@@ -281,6 +281,7 @@ fn in_open_loop_the_recording_is_what_was_put_out() {
         injection_v: sawtooth(20_000),
         decimation: 1,
         time_limit_s: 30.0,
+        goes_on: false,
     };
     let recording = test_axis.perform(&experiment, &mut |_| {}).unwrap();
     assert_eq!(recording.len(), 10_000);
@@ -327,6 +328,7 @@ fn in_closed_loop_injection_and_motion_begin_together() {
         injection_v: sawtooth(4_000),
         decimation: 1,
         time_limit_s: 30.0,
+        goes_on: false,
     };
     let recording = test_axis.perform(&experiment, &mut |_| {}).unwrap();
     let moved = recording
@@ -367,6 +369,7 @@ fn an_axis_that_leaves_the_travel_is_a_fault_of_the_experiment() {
         injection_v: vec![0.3; 20_000],
         decimation: 1,
         time_limit_s: 30.0,
+        goes_on: false,
     };
     let error = test_axis.perform(&experiment, &mut |_| {}).unwrap_err();
     assert!(

@@ -814,7 +814,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         self.amplifier.code(total.within(self.amplifier.limit))
     }
 
-    /// Takes note of a stop; at the next start the friction model adopts the integral's change since then.
+    /// Takes note of a stop; at the next start the friction fed forward takes over the integral's change since then.
     #[cold]
     #[inline(never)]
     fn set_off_or_stop(&self, state: &mut AxisState<S, N>, moves: bool) {
@@ -824,13 +824,14 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         }
         state.fading.set_off(integral);
         let since_stop = state.rest.set_off(integral);
+        let mut held = S::ZERO;
         let taken = if self.oscillation.returns_from_rest(&mut state.oscillation) {
-            // The axis was held by the integral, not by what the model says.
+            // The axis was held by the integral, not by what the model says, and by what is left of that.
             state.friction = self.feedforward.start();
-            Some(state.fading.taken_up(integral))
+            held = state.telemetry.feedforward.presliding;
+            Some(state.fading.taken_up(integral) + held)
         } else {
-            // What friction that is not fed forward took over would be lost.
-            since_stop.filter(|_| !self.oscillation.may_fade(&state.oscillation))
+            since_stop
         };
         let Some(mut taken) = taken else {
             return;
@@ -842,7 +843,11 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if self.learns {
             taken = self.learning.take_over(&mut state.learning, taken);
         }
-        self.unload(state, taken);
+        if state.oscillation.is_reduced() {
+            let share = self.oscillation.share(&state.oscillation);
+            taken = taken.times(share, Quantity::Multiplier);
+        }
+        self.unload(state, taken - held);
     }
 
     /// Takes a voltage that something else puts out from the integral.

@@ -3,7 +3,10 @@
 //! An axis that stands is held by its friction, so that its voltage is the friction's force. After a stop it creeps back into its
 //! place, by micrometres; the integral sees to it, and friction changes by as much as the integral does. The feedforward knows the
 //! reference alone, which stands. So when the reference sets off, the pre-sliding model adopts the integral's change
-//! since the stop, and the integral gives it back: the output stays as it is, and the model begins with the friction of the axis.
+//! since the stop, and the integral gives it back: the output stays as it is, and the model begins with the friction of the axis. Of a model that
+//! acts by a share, the output changes by that share, and so does the integral.
+//!
+//! The static model knows no rest: its whole level begins with the motion, and the integral gives its change back for it.
 //!
 //! The integral keeps its voltage of the moment at which the reference stopped: an offset, gravity. A load that changes at rest
 //! cannot be distinguished from friction by the encoder, and goes to the model, too, up to the breakaway level.

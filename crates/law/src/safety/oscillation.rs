@@ -374,18 +374,6 @@ impl<S: Scalar> Oscillation<S> {
         returns
     }
 
-    /// True while less than all of the friction feedforward acts, and of a motion that begins now in which less may.
-    pub fn may_fade(&self, state: &OscillationState) -> bool {
-        let fades = match state.planned {
-            Some(planned) => self.steps(planned.speed, planned.counts) > 0,
-            None => {
-                let stroke = state.pace;
-                !self.has_paused(state) && self.steps(stroke.most, stroke.way) > 0
-            }
-        };
-        state.is_reduced() | (self.may_ever_fade() & fades)
-    }
-
     /// True of an axis whose next stroke has nothing to do with the one before.
     fn has_paused(&self, state: &OscillationState) -> bool {
         (state.pace.rested >= self.pause_looks) | (state.pace.sense == 0)

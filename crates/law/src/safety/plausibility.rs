@@ -112,7 +112,8 @@ pub struct PlausibilityModel {
     pub largest_mm_s: f64,
     /// Change of the voltage that need not show as motion, in closed loop, V.
     pub held_v: f64,
-    /// The same of a change towards zero, as far as there was that much voltage when the axis came to rest, V.
+    /// The same of a change towards zero, as far as there was that much voltage when the axis came to rest, V. As much is held of an axis
+    /// that came to rest while its law braked it.
     pub eased_v: f64,
     /// The same of a voltage that fell to zero and beyond, on the other side, of an axis that rests, V.
     pub regained_v: f64,

@@ -557,25 +557,6 @@ fn friction_is_fed_forward_on_strokes_beyond_a_length_and_on_the_first_one_after
 }
 
 #[test]
-fn a_motion_that_may_be_short_takes_nothing_over_from_the_integral() {
-    let mut shown = Shown::feeding_beyond_100_counts();
-    assert!(!shown.monitor.may_fade(&shown.state), "the first one");
-    shown.strokes(1, 1000, 10);
-    assert!(!shown.monitor.may_fade(&shown.state), "after a long one");
-    shown.strokes(1, 80, 10);
-    assert!(shown.monitor.may_fade(&shown.state), "after a short one");
-    shown.rest(0.2);
-    assert!(!shown.monitor.may_fade(&shown.state), "after a rest");
-    for (counts, may) in [(1000, false), (50, true)] {
-        let planned = Some(PlannedStroke { counts, speed: 1 });
-        shown.monitor.plan(&mut shown.state, planned);
-        assert_eq!(shown.monitor.may_fade(&shown.state), may, "{counts}");
-    }
-    let always = Oscillation::<f64>::new(true, 1e6, 1e-4);
-    assert!(!always.may_fade(&OscillationState::default()));
-}
-
-#[test]
 fn friction_that_returns_in_a_stroke_does_not_throw_an_axis_whose_integral_holds_it() {
     fn check<S: Scalar>() {
         const FROM_MM: f64 = 0.3;

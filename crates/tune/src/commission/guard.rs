@@ -271,6 +271,7 @@ mod tests {
             injection_v: Vec::new(),
             decimation: 10,
             time_limit_s: 10.0,
+            goes_on: false,
         }
     }
 

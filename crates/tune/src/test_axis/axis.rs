@@ -36,6 +36,9 @@ pub struct Experiment {
     pub decimation: usize,
     /// Time after which the experiment is given up, s.
     pub time_limit_s: f64,
+    /// True if the law goes on from the experiment before, with what it remembers, unless that was stopped. On a connected machine it does
+    /// in any case: the outputs stay on.
+    pub goes_on: bool,
 }
 
 /// Data of an axis, as far as identification may know them.

@@ -592,6 +592,7 @@ fn after_a_knock(axis: &mut SimulatedTestAxis, knock_v: f64) -> f64 {
         injection_v,
         decimation: 1,
         time_limit_s: 5.0,
+        goes_on: false,
     };
     let position_mm = axis.perform(&held, &mut |_| {}).unwrap().position_mm;
     let tail = &position_mm[position_mm.len() - 5000..];

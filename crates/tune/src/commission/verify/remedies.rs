@@ -10,9 +10,9 @@ use quadrant_sim::sine_test::SineTest;
 
 use super::VerifyError;
 use super::law_result::{LawResult, MAX_ERROR_RATIO, MAX_SCATTER_RATIO};
-use super::sines::CHOICE_SINES;
+use super::sines::{CHOICE_SINES, USUAL_CYCLES};
 use super::small::Refused;
-use super::small_motions::FROM_MM_S;
+use super::small_motions::{FROM_MM_S, SmallMotion};
 use super::trials::Trials;
 use super::variants::{feeding_beyond, feeding_from, with_friction};
 
@@ -267,8 +267,8 @@ impl Trials<'_, '_> {
         // Where it is the PID, what differs is chance.
         let differing: Vec<usize> = (0..all)
             .filter(|&index| {
-                let sine = &self.bench.sines[index];
-                !self.is_pid_on(&found.settings, 2.0 * sine.amplitude_mm, sine.velocity_mm_s)
+                let sine = SmallMotion::Sine(self.bench.sines[index], USUAL_CYCLES);
+                !self.is_pid_on(&found.settings, sine)
             })
             .collect();
         let (worst, _) = found

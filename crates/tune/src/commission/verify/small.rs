@@ -69,7 +69,7 @@ impl Trials<'_, '_> {
         let pid_when_small_mm = &self.pid_when_small_mm;
         let differs = motions
             .iter()
-            .map(|motion| !self.is_pid_on(&settings, motion.stroke_mm(), motion.velocity_mm_s()));
+            .map(|motion| !self.is_pid_on(&settings, *motion));
         let differs: Vec<bool> = differs.collect();
         let is_far = |index: usize, own_mm: f64| {
             let pid_mm = pid_when_small_mm.get(index).filter(|_| differs[index]);
@@ -102,9 +102,7 @@ impl Trials<'_, '_> {
                 pid_mm: *pid_mm,
             })
             .filter(|it| {
-                let motion = it.motion;
-                is_worse(it.largest_mm, it.pid_mm, count_mm)
-                    && !self.is_pid_on(settings, motion.stroke_mm(), motion.velocity_mm_s())
+                is_worse(it.largest_mm, it.pid_mm, count_mm) && !self.is_pid_on(settings, it.motion)
             })
             .max_by(|a, b| a.ratio().total_cmp(&b.ratio()))
     }
@@ -130,13 +128,9 @@ impl Trials<'_, '_> {
         Ok(())
     }
 
-    /// True of settings that are the PID's on a motion of some stroke, mm, and largest velocity, mm/s: what differs is chance.
-    pub(super) fn is_pid_on(
-        &self,
-        settings: &AxisSettings,
-        stroke_mm: f64,
-        velocity_mm_s: f64,
-    ) -> bool {
+    /// True of settings that are the PID's on a motion: what differs is chance.
+    pub(super) fn is_pid_on(&self, settings: &AxisSettings, motion: SmallMotion) -> bool {
+        let (stroke_mm, velocity_mm_s) = (motion.stroke_mm(), motion.velocity_mm_s());
         let (is_linear, fed) = (
             settings.feedback == self.pid.feedback,
             &settings.feedforward,
@@ -199,10 +193,7 @@ impl Trials<'_, '_> {
     ) -> Result<Option<Worse>, VerifyError> {
         let all = self.bench.small_motions;
         let end = range.end;
-        let differs = |index: &usize| {
-            let motion = all[*index];
-            !self.is_pid_on(&law.settings, motion.stroke_mm(), motion.velocity_mm_s())
-        };
+        let differs = |index: &usize| !self.is_pid_on(&law.settings, all[*index]);
         let indices: Vec<usize> = range.filter(differs).collect();
         if law.stopped.is_some() || indices.is_empty() {
             return Ok(None);

@@ -189,6 +189,7 @@ impl LevelSearch {
             injection_v: steps(&test, levels_v, self.ahead, rate_hz),
             decimation: 1,
             time_limit_s: 60.0,
+            goes_on: false,
         }
     }
 

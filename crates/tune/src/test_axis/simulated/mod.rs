@@ -7,6 +7,7 @@ use std::collections::VecDeque;
 
 use self::recorder::{Period, Recorder};
 use self::watch::Watch;
+use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
@@ -36,8 +37,12 @@ const COASTING_TICKS: usize = 20_000;
 const REST_TICKS: usize = 300;
 /// Largest velocity that counts as rest, mm/s.
 const AT_REST_MM_S: f64 = 0.01;
+/// Control periods from the beginning of an experiment that goes on from another to its motion.
+const RUN_TICK: u32 = 100;
 /// Names of the axes.
 const NAMES: [&str; 3] = ["x", "y", "z"];
+
+type Machine = LawMachine<f32, ELEMENTS>;
 
 /// One axis of the simulated stage.
 ///
@@ -58,6 +63,8 @@ pub struct SimulatedTestAxis {
     interrupted: Option<Recording>,
     /// The axis under test is the first; the others stand still.
     stage: StageSettings,
+    /// The law of the last experiment in closed loop, with the outputs on, for one that goes on from it.
+    kept: Option<Box<Machine>>,
 }
 
 impl SimulatedTestAxis {
@@ -91,6 +98,7 @@ impl SimulatedTestAxis {
             interrupted: None,
             plant: SimulatedAxis::new(truth, stage.rate_hz, seed),
             stage,
+            kept: None,
         }
     }
 
@@ -161,7 +169,14 @@ impl SimulatedTestAxis {
         DacCode::from_volts(volts, self.full_scale_v)
     }
 
-    /// Runs the experiment until it ends; what follows, the outputs off, is the caller's.
+    /// Switches the outputs off that an experiment left on.
+    fn switch_off(&mut self) {
+        if self.kept.take().is_some() {
+            self.move_on(DacCode::ZERO, false);
+        }
+    }
+
+    /// Runs the experiment until it ends; to switch the outputs off is the caller's.
     fn drive(
         &mut self,
         experiment: &Experiment,
@@ -171,6 +186,9 @@ impl SimulatedTestAxis {
         let mut watch = Watch::new(experiment, self.info());
         let mut recorder = Recorder::new(experiment.decimation, self.stage.rate_hz);
         let outcome = self.run(experiment, &mut law, &mut watch, &mut recorder, progress);
+        if outcome.is_ok() {
+            self.kept = law.into_machine();
+        }
         self.interrupted = outcome
             .is_err()
             .then(|| recorder.latest(self.stage.rate_hz));
@@ -236,26 +254,35 @@ impl SimulatedTestAxis {
         }
     }
 
-    fn law(&self, experiment: &Experiment) -> Result<Law, ExperimentError> {
+    /// The law's side of an experiment.
+    fn law(&mut self, experiment: &Experiment) -> Result<Law, ExperimentError> {
+        let kept = self.kept.take();
         let Drive::ClosedLoop(motion) = &experiment.drive else {
             return Ok(Law::OpenLoop);
         };
         let plan = PlanSettings {
             motions: [*motion, MotionSettings::Hold, MotionSettings::Hold],
         };
+        let waits_for_motion = *motion != MotionSettings::Hold;
         let build = || {
             let plan = plan.build(&self.stage)?;
-            Ok(LawMachine::with_plan(self.stage.build()?, plan).with_x_alone())
+            let Some(mut machine) = kept else {
+                let machine = LawMachine::with_plan(self.stage.build()?, plan).with_x_alone();
+                return Ok((Box::new(machine), Operator::runs_the_plan()));
+            };
+            machine.set_motion(AxisName::X, plan[AxisName::X].clone());
+            let run = waits_for_motion.then_some((RUN_TICK, Command::Run));
+            Ok((machine, Operator::follows(run)))
         };
-        let machine = build().map_err(|source| ExperimentError::Motion {
+        let (machine, operator) = build().map_err(|source| ExperimentError::Motion {
             experiment: experiment.name.clone(),
             source,
         })?;
         Ok(Law::ClosedLoop {
-            machine: Box::new(machine),
-            operator: Operator::runs_the_plan(),
+            machine,
+            operator,
             tick: 0,
-            waits_for_motion: *motion != MotionSettings::Hold,
+            waits_for_motion,
         })
     }
 }
@@ -264,7 +291,7 @@ impl SimulatedTestAxis {
 enum Law {
     OpenLoop,
     ClosedLoop {
-        machine: Box<LawMachine<f32, ELEMENTS>>,
+        machine: Box<Machine>,
         operator: Operator,
         tick: u32,
         /// There is a motion, and it has not begun.
@@ -281,6 +308,14 @@ struct Step {
 }
 
 impl Law {
+    /// The law itself.
+    fn into_machine(self) -> Option<Box<Machine>> {
+        match self {
+            Self::OpenLoop => None,
+            Self::ClosedLoop { machine, .. } => Some(machine),
+        }
+    }
+
     /// The law's reason to keep the outputs off.
     fn not_enabled(&self, experiment: &Experiment) -> ExperimentError {
         let (events, safety) = match self {
@@ -360,6 +395,9 @@ impl TestAxis for SimulatedTestAxis {
         let mut stage = self.stage.clone();
         stage.axes[0] = settings.clone();
         stage.validate(ELEMENTS)?;
+        if stage != self.stage {
+            self.switch_off();
+        }
         self.stage = stage;
         Ok(())
     }
@@ -369,8 +407,13 @@ impl TestAxis for SimulatedTestAxis {
         experiment: &Experiment,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, ExperimentError> {
+        if !experiment.goes_on {
+            self.switch_off();
+        }
         let outcome = self.drive(experiment, progress);
-        self.move_on(DacCode::ZERO, false);
+        if self.kept.is_none() {
+            self.move_on(DacCode::ZERO, false);
+        }
         if outcome.is_err() {
             self.coast();
         }
