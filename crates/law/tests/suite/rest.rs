@@ -80,18 +80,21 @@ fn the_first_motion_after_a_rest_errs_like_any_other() {
             "fading a little, fixed point",
             errors_um::<Fixed>(&fading(2.52)),
         ),
-        ("fading", errors_um::<f32>(&fading(3.1))),
-        ("fading a lot", errors_um::<f32>(&fading(4.0))),
-        (
-            "fading a lot, fixed point",
-            errors_um::<Fixed>(&fading(4.0)),
-        ),
         ("static", errors_um::<f32>(&level_alone)),
         ("static, fixed point", errors_um::<Fixed>(&level_alone)),
     ] {
         println!("{what}: {in_motion:.1} um in motion, {after:.1} um after a rest");
         // The model's elements share the adopted voltage by their weights, and the axis' by their springs.
-        assert!(after < 1.25 * in_motion + 7.0, "{what}: {after} um");
+        assert!(after < in_motion + 7.0, "{what}: {after} um");
+    }
+    // Where the integral holds a good part of friction, it has to turn round.
+    for (what, [in_motion, after]) in [
+        ("fading", errors_um::<f32>(&fading(3.1))),
+        ("fading a lot", errors_um::<f32>(&fading(4.0))),
+        ("in fixed point", errors_um::<Fixed>(&fading(4.0))),
+    ] {
+        println!("{what}: {in_motion:.1} um in motion, {after:.1} um after a rest");
+        assert!(after < 1.25 * in_motion, "{what}: {after} um");
     }
 }
 
@@ -140,13 +143,15 @@ fn the_output_goes_on_from_where_it_was() {
             "fading, a jog, fixed point",
             at_start::<Fixed>(&fading(2.52), 1.0, jog),
         ),
-        ("half, a jog", at_start::<f32>(&fading(3.4), 1.0, jog)),
     ] {
         println!("{what}: a step of {step:.4} V, {moved:.4} V adopted");
         // A count moves the derivative by half as much as is adopted here, and is there without a rest, too.
-        assert!(moved > 0.06, "{what}: {moved} V adopted");
+        assert!(moved > 0.1, "{what}: {moved} V adopted");
         assert!(step < 0.5 * moved, "{what}: {step} V");
     }
+    // Half of friction was the integral's.
+    let [step, moved] = at_start::<f32>(&fading(3.4), 1.0, jog);
+    assert!(moved > 0.06 && step < 0.1 * moved, "{step} V, {moved} V");
 }
 
 #[test]

@@ -172,7 +172,7 @@ pub fn run_moves(
     let info = test_axis.info();
     let max_acceleration_mm_s2 = MOVE_MM_S2.min(MOST_ACCELERATION * info.max_acceleration_mm_s2);
     let rest = vec![0.0; (REST_S * info.rate_hz) as usize];
-    let (mut largest_mm, mut begun) = (0.0_f64, false);
+    let mut largest_mm = 0.0_f64;
     for index in 0..2 * PAIRS {
         let sign = if index % 2 == 0 { 1.0 } else { -1.0 };
         let moving = MotionSettings::PointToPoint(PointToPointSettings {
@@ -190,11 +190,10 @@ pub fn run_moves(
                     decimation: 1,
                     time_limit_s: 60.0,
                     // What the law holds at a rest is part of the next move.
-                    goes_on: begun,
+                    goes_on: index > 0 || motion == MotionSettings::Hold,
                 },
                 &mut |_| {},
             )?;
-            begun = true;
             let pairs = recording.reference_mm.iter().zip(&recording.position_mm);
             largest_mm = pairs.fold(largest_mm, |largest, (reference, position)| {
                 largest.max((reference - position).abs())
