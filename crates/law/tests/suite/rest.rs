@@ -34,10 +34,20 @@ fn largest_um<S: Scalar>(axis: &mut Axis<S>, seconds: f64) -> f64 {
     })
 }
 
-/// An axis that has worked and then stood.
+/// An axis that has worked on the sine and then stood.
 fn rested<S: Scalar>(settings: &StageSettings, friction: f64, work_s: f64) -> Axis<S> {
+    rested_after(settings, friction, Command::Run, work_s)
+}
+
+/// The same after another motion.
+fn rested_after<S: Scalar>(
+    settings: &StageSettings,
+    friction: f64,
+    work: Command,
+    work_s: f64,
+) -> Axis<S> {
     let mut axis = Axis::<S>::on_sine(settings, friction);
-    axis.command(Command::Run);
+    axis.command(work);
     axis.run(work_s);
     axis.command(Command::Stop);
     axis.run(REST_S);
@@ -100,7 +110,11 @@ fn the_first_motion_after_a_rest_errs_like_any_other() {
 
 /// The largest step of the output within the first 2 ms of a motion, and by how much the integral has moved until then, V.
 fn at_start<S: Scalar>(settings: &StageSettings, friction: f64, command: Command) -> [f64; 2] {
-    let mut axis = rested::<S>(settings, friction, 6.0);
+    at_start_of(rested::<S>(settings, friction, 6.0), command)
+}
+
+/// The same of an axis.
+fn at_start_of<S: Scalar>(mut axis: Axis<S>, command: Command) -> [f64; 2] {
     let before = voltage(axis.seen().feedback.integral);
     let mut last = voltage(axis.seen().output);
     axis.rig.inputs.command = Some(command);
@@ -152,6 +166,37 @@ fn the_output_goes_on_from_where_it_was() {
     // Half of friction was the integral's.
     let [step, moved] = at_start::<f32>(&fading(3.4), 1.0, jog);
     assert!(moved > 0.06 && step < 0.1 * moved, "{step} V, {moved} V");
+}
+
+/// After a jog at 5 mm/s, all of whose friction is fed forward, and a rest: the step of the output at the start of the sine, where less of
+/// it is, and the adopted voltage, V; the largest error of its first 2 s, and 3 s later, um.
+fn after_a_jog<S: Scalar>(from_mm_s: f64) -> [f64; 4] {
+    let settings = with(|x| x.feedforward.from_mm_s = from_mm_s);
+    let jog = Command::Jog(AxisName::X, settings.jog_at(AxisName::X, 5.0).unwrap());
+    let rested = || rested_after::<S>(&settings, 1.0, jog, 2.0);
+    let [step, moved] = at_start_of(rested(), Command::Run);
+    let mut axis = rested();
+    axis.command(Command::Run);
+    let first = largest_um(&mut axis, 2.0);
+    axis.run(3.0);
+    let later = largest_um(&mut axis, 2.0);
+    [step, moved, first, later]
+}
+
+#[test]
+fn a_motion_with_less_friction_fed_forward_than_the_one_before_its_rest_is_not_thrown() {
+    for from_mm_s in [2.52, 3.1, 3.4, 4.0] {
+        for (numbers, [step, moved, first, later]) in [
+            ("f32", after_a_jog::<f32>(from_mm_s)),
+            ("fixed point", after_a_jog::<Fixed>(from_mm_s)),
+        ] {
+            println!(
+                "{from_mm_s} mm/s, {numbers}: a step of {step:.4} V, {moved:.4} V adopted, {first:.1} um, {later:.1} um later"
+            );
+            assert!(moved > 0.1 && step < 0.5 * moved, "{step} V, {moved} V");
+            assert!(first < later + 7.0, "{first} um, then {later} um");
+        }
+    }
 }
 
 #[test]
