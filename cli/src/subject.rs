@@ -304,6 +304,10 @@ mod tests {
             self.axis.apply(settings)
         }
 
+        fn switch_off(&mut self) {
+            self.axis.switch_off();
+        }
+
         fn perform(
             &mut self,
             experiment: &Experiment,

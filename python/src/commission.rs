@@ -47,6 +47,10 @@ impl TestAxis for Cancellable<'_> {
         self.axis.apply(settings)
     }
 
+    fn switch_off(&mut self) {
+        self.axis.switch_off();
+    }
+
     fn perform(
         &mut self,
         experiment: &Experiment,

@@ -39,7 +39,6 @@ fn shaken() -> Recording {
                 injection_v: excitation.samples(RATE_HZ, periods),
                 decimation: 1,
                 time_limit_s: 1e3,
-                goes_on: false,
             },
             &mut |_| {},
         )

@@ -135,7 +135,6 @@ fn an_experiment_ends_at_once_when_the_machine_is_switched_on() {
         injection_v: vec![0.001; 4 * 8_000],
         decimation: 4,
         time_limit_s: 30.0,
-        goes_on: false,
     };
     let switch = thread::spawn(move || {
         thread::sleep(Duration::from_millis(500));

@@ -132,7 +132,6 @@ fn to_and_fro(
                 injection_v: Vec::new(),
                 decimation: 10,
                 time_limit_s: 120.0,
-                goes_on: true,
             },
             &mut |_| {},
         );
@@ -183,7 +182,6 @@ fn knocked(
             injection_v: vec![0.0; samples(before_s + knock_s + after_s)],
             decimation: 1,
             time_limit_s: 10.0,
-            goes_on: false,
         };
         let recording = axis.perform(&held, &mut |_| {})?;
         let tenth = samples(0.1);

@@ -279,6 +279,10 @@ impl TestAxis for Timed<'_> {
         self.bench.axis_mut().apply(settings)
     }
 
+    fn switch_off(&mut self) {
+        self.bench.axis_mut().switch_off();
+    }
+
     fn perform(
         &mut self,
         experiment: &Experiment,

@@ -88,7 +88,6 @@ fn drive(
                 injection_v: Vec::new(),
                 decimation: 10,
                 time_limit_s: 10.0,
-                goes_on: false,
             };
             let _ = test_axis.perform(&experiment, &mut |_| {});
         }

@@ -422,6 +422,12 @@ impl TestAxis for Journal<'_> {
         Ok(())
     }
 
+    fn switch_off(&mut self) {
+        if !self.known {
+            self.axis.switch_off();
+        }
+    }
+
     fn perform(
         &mut self,
         experiment: &Experiment,
@@ -502,7 +508,6 @@ mod tests {
             injection_v: vec![0.3; ticks],
             decimation: 1,
             time_limit_s: 1.0,
-            goes_on: false,
         }
     }
 

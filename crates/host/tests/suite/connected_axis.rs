@@ -281,7 +281,6 @@ fn in_open_loop_the_recording_is_what_was_put_out() {
         injection_v: sawtooth(20_000),
         decimation: 1,
         time_limit_s: 30.0,
-        goes_on: false,
     };
     let recording = test_axis.perform(&experiment, &mut |_| {}).unwrap();
     assert_eq!(recording.len(), 10_000);
@@ -328,7 +327,6 @@ fn in_closed_loop_injection_and_motion_begin_together() {
         injection_v: sawtooth(4_000),
         decimation: 1,
         time_limit_s: 30.0,
-        goes_on: false,
     };
     let recording = test_axis.perform(&experiment, &mut |_| {}).unwrap();
     let moved = recording
@@ -359,6 +357,32 @@ fn in_closed_loop_injection_and_motion_begin_together() {
 }
 
 #[test]
+fn the_outputs_stay_on_after_an_experiment_until_they_are_switched_off_and_come_on_with_the_next() {
+    let hold = Experiment {
+        name: "holding".to_owned(),
+        drive: Drive::ClosedLoop(MotionSettings::Hold),
+        injection_v: vec![0.0; 1_000],
+        decimation: 1,
+        time_limit_s: 30.0,
+    };
+    let after = |switches: &[bool]| {
+        let mut client = client();
+        let travel = Travel::either_way(20.0);
+        let mut axis = ConnectedAxis::new(&mut client, AxisName::X, travel).unwrap();
+        for off in switches {
+            axis.perform(&hold, &mut |_| {}).unwrap();
+            if *off {
+                axis.switch_off();
+            }
+        }
+        client.status().unwrap().state
+    };
+    assert_eq!(after(&[false]), MachineState::Enabled);
+    assert_eq!(after(&[true]), MachineState::Disabled);
+    assert_eq!(after(&[true, false]), MachineState::Enabled);
+}
+
+#[test]
 fn an_axis_that_leaves_the_travel_is_a_fault_of_the_experiment() {
     let mut client = client();
     let mut test_axis =
@@ -369,7 +393,6 @@ fn an_axis_that_leaves_the_travel_is_a_fault_of_the_experiment() {
         injection_v: vec![0.3; 20_000],
         decimation: 1,
         time_limit_s: 30.0,
-        goes_on: false,
     };
     let error = test_axis.perform(&experiment, &mut |_| {}).unwrap_err();
     assert!(

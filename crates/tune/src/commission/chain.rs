@@ -91,12 +91,8 @@ fn guarded(
     })?;
 
     step += 1;
-    let Linear {
-        motor,
-        response,
-        plant,
-        mut controller,
-    } = match linear_model(
+    test_axis.begin_off(true);
+    let found = linear_model(
         test_axis,
         base,
         request,
@@ -105,7 +101,14 @@ fn guarded(
         &mut |share| {
             report(watch, step, share);
         },
-    ) {
+    );
+    test_axis.begin_off(false);
+    let Linear {
+        motor,
+        response,
+        plant,
+        mut controller,
+    } = match found {
         Ok(found) => found,
         Err(error) => return Err(velocity_mode::explain(test_axis, base, &motor, error)),
     };

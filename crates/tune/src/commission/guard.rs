@@ -57,6 +57,8 @@ pub struct Guard<'a> {
     rings: Option<Ringing>,
     /// The end of the last experiment.
     last: Recording,
+    /// Each experiment begins with the outputs off.
+    begins_off: bool,
 }
 
 impl<'a> Guard<'a> {
@@ -70,7 +72,14 @@ impl<'a> Guard<'a> {
             runs: Vec::new(),
             rings: None,
             last: Recording::default(),
+            begins_off: false,
         }
+    }
+
+    /// Has the outputs switched off before each experiment, or no more. A controller of which nobody knows whether it holds the axis has no
+    /// time to make it swing then, and friction holds an axis that was driven in open loop.
+    pub fn begin_off(&mut self, begins_off: bool) {
+        self.begins_off = begins_off;
     }
 
     /// Takes the deceleration by friction into account, mm/s^2.
@@ -206,6 +215,10 @@ impl TestAxis for Guard<'_> {
         self.axis.apply(&self.limited(settings))
     }
 
+    fn switch_off(&mut self) {
+        self.axis.switch_off();
+    }
+
     fn perform(
         &mut self,
         experiment: &Experiment,
@@ -213,6 +226,9 @@ impl TestAxis for Guard<'_> {
     ) -> Result<Recording, ExperimentError> {
         self.check_fits(experiment)?;
         self.rings = None;
+        if self.begins_off {
+            self.axis.switch_off();
+        }
         let outcome = self.axis.perform(experiment, progress);
         let stopped = self.axis.interrupted().cloned();
         match (&outcome, stopped) {
@@ -271,7 +287,6 @@ mod tests {
             injection_v: Vec::new(),
             decimation: 10,
             time_limit_s: 10.0,
-            goes_on: false,
         }
     }
 
@@ -286,6 +301,26 @@ mod tests {
         assert!(refused.to_string().contains("more --travel"), "{refused}");
         assert_eq!(guard.runs.len(), 1);
         guard.perform(&to(-12.0), &mut |_| {}).unwrap();
+    }
+
+    #[test]
+    fn an_experiment_that_is_to_begin_with_the_outputs_off_knows_nothing_of_the_last_one() {
+        let first_v = |begins_off: bool| {
+            let mut axis = SimulatedTestAxis::new(0, x(), 1).with_travel_mm(TRAVEL_MM);
+            let mut guard = Guard::new(&mut axis);
+            let settings = measured(guard.settings());
+            guard.apply(&settings).unwrap();
+            guard.begin_off(begins_off);
+            guard.perform(&to(3.0), &mut |_| {}).unwrap();
+            let rest = Experiment {
+                drive: Drive::ClosedLoop(MotionSettings::Hold),
+                injection_v: vec![0.0; 100],
+                ..to(0.0)
+            };
+            guard.perform(&rest, &mut |_| {}).unwrap().voltage_v[0].abs()
+        };
+        let (held_v, begun_v) = (first_v(false), first_v(true));
+        assert!(begun_v < 0.2 * held_v, "{begun_v} V of {held_v} V");
     }
 
     #[test]

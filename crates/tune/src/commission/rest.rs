@@ -123,7 +123,6 @@ impl Knock {
                 injection_v,
                 decimation: 1,
                 time_limit_s: 10.0,
-                goes_on: false,
             };
             let recording = test_axis.perform(&experiment, &mut |_| {})?;
             let counted = (COUNTED_S / recording.sample_time_s) as usize;

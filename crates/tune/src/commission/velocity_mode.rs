@@ -87,7 +87,6 @@ fn holds(level_v: f64, rate_hz: f64) -> Experiment {
         injection_v: held.collect(),
         decimation: 1,
         time_limit_s: 10.0,
-        goes_on: false,
     }
 }
 

@@ -94,7 +94,6 @@ impl AtRest {
                 injection_v: recording.injection_v.clone(),
                 decimation: 1,
                 time_limit_s: 10.0 + 2.0 * recording.duration_s(),
-                goes_on: false,
             },
             rate_hz,
             recording,

@@ -117,7 +117,6 @@ pub fn measure(
                 injection_v: passes(settings, voltage_v, axis.rate_hz),
                 decimation: 1,
                 time_limit_s: 60.0,
-                goes_on: false,
             },
             progress,
         )?;

@@ -124,7 +124,6 @@ fn move_to(
         injection_v: vec![0.0; (LOOK_S * rate_hz).ceil() as usize],
         decimation: 1,
         time_limit_s: 10.0,
-        goes_on: false,
     };
     let recording = test_axis.perform(&look, &mut |_| {})?;
     let position_mm = recording.position_mm.last().copied().unwrap_or(target_mm);
@@ -144,7 +143,6 @@ fn move_to(
             injection_v: Vec::new(),
             decimation: 100,
             time_limit_s: 10.0 + 2.0 * distance_mm.abs() / velocity_mm_s,
-            goes_on: false,
         },
         &mut |_| {},
     )?;

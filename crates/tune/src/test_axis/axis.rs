@@ -36,9 +36,6 @@ pub struct Experiment {
     pub decimation: usize,
     /// Time after which the experiment is given up, s.
     pub time_limit_s: f64,
-    /// True if the law goes on from the experiment before, with what it remembers, unless that was stopped. On a connected machine it does
-    /// in any case: the outputs stay on.
-    pub goes_on: bool,
 }
 
 /// Data of an axis, as far as identification may know them.
@@ -83,8 +80,11 @@ pub trait TestAxis {
     /// Settings that are refused, here or by the machine, or a connection that is broken; the old ones stay in force.
     fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError>;
 
+    /// Switches the outputs off until the next experiment, which says so where they cannot be.
+    fn switch_off(&mut self);
+
     /// Runs an experiment from where the axis stands, and records it. `progress` receives the share that is done,
-    /// 0 to 1, a few times a second.
+    /// 0 to 1, a few times a second. After one in closed loop the outputs stay on, and the next goes on with what the law remembers.
     ///
     /// # Errors
     /// The error that stopped the experiment; the outputs are off then.

@@ -90,7 +90,7 @@ fn every_waveform_shows_the_sliding_axis() {
         if waveform != Waveform::Multisine {
             // The power is spread over all lines, so that each takes longer to show.
             settings.excitation.rms_v = 0.035;
-            settings.periods = 240;
+            settings.periods = 320;
         }
         let found = measured(&mut slow_rig(&truth, 1), &settings);
         assert_true(&found.estimate.response, &sliding(&truth), 40);
@@ -348,6 +348,10 @@ impl TestAxis for Coarse {
 
     fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
         self.0.apply(settings)
+    }
+
+    fn switch_off(&mut self) {
+        self.0.switch_off();
     }
 
     fn perform(

@@ -526,7 +526,6 @@ fn a_record_that_hardly_accelerates_leaves_its_inertia_in_doubt_and_an_ordinary_
         injection_v: Vec::new(),
         decimation: 2,
         time_limit_s: 60.0,
-        goes_on: false,
     };
     let record = test_axis.perform(&slow, &mut |_| {}).unwrap();
     let model = |record: &Recording| {

@@ -239,9 +239,14 @@ impl<'a> ConnectedAxis<'a> {
 
     /// Waits for rest and switches the outputs off, if settings are to change on which safety depends.
     fn disabled_for(&mut self, stage: &StageSettings) -> Result<(), settings::ExchangeError> {
-        if stage.safety_change(&self.stage).is_none() {
-            return Ok(());
+        match stage.safety_change(&self.stage) {
+            Some(_) => self.disable().map_err(Into::into),
+            None => Ok(()),
         }
+    }
+
+    /// Waits for rest and switches the outputs off.
+    fn disable(&mut self) -> Result<(), ClientError> {
         let status = settle::rest(self.client, BEFORE)?;
         if status.state == MachineState::Enabled {
             self.client.order(Body::Disable)?;
@@ -299,6 +304,10 @@ impl TestAxis for ConnectedAxis<'_> {
             .map_err(|error| MachineError::Connection(Box::new(error)))?;
         self.stage = stage;
         Ok(())
+    }
+
+    fn switch_off(&mut self) {
+        let _ = self.disable();
     }
 
     fn perform(

@@ -274,7 +274,6 @@ fn a_connected_axis_runs_experiments_in_closed_loop() {
         injection_v: Vec::new(),
         decimation: 10,
         time_limit_s: 20.0,
-        goes_on: false,
     };
     let recording = test_axis.perform(&experiment, &mut |_| {}).unwrap();
     // The model's plan takes half a second, but its axes stand.

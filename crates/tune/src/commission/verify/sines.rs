@@ -150,7 +150,6 @@ pub fn run_cycles(
             injection_v: Vec::new(),
             decimation: 1,
             time_limit_s: 60.0 + 2.0 * cycles.all() / sine.frequency_hz,
-            goes_on: false,
         },
         progress,
     )?;

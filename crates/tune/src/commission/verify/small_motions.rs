@@ -189,8 +189,6 @@ pub fn run_moves(
                     injection_v,
                     decimation: 1,
                     time_limit_s: 60.0,
-                    // What the law holds at a rest is part of the next move.
-                    goes_on: index > 0 || motion == MotionSettings::Hold,
                 },
                 &mut |_| {},
             )?;

@@ -357,7 +357,6 @@ pub fn standstill(settings: &FrfSettings, rate_hz: f64) -> Experiment {
         injection_v: settings.excitation.samples(rate_hz, periods),
         decimation: 1,
         time_limit_s: 10.0 + 2.0 * periods as f64 * settings.excitation.period_s,
-        goes_on: false,
     }
 }
 
@@ -403,7 +402,6 @@ fn pass(
         injection_v: settings.excitation.samples(rate_hz, excited),
         decimation: 1,
         time_limit_s: 10.0 + 2.0 * duration_s,
-        goes_on: false,
     };
     Ok((experiment, periods))
 }

@@ -75,7 +75,6 @@ pub fn shuttle(
             injection_v: Vec::new(),
             decimation: 1,
             time_limit_s: 60.0,
-            goes_on: false,
         };
         let recording = test_axis.perform(&experiment, &mut |share| {
             progress((index as f64 + share) / motions.len() as f64);

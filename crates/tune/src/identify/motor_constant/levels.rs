@@ -189,7 +189,6 @@ impl LevelSearch {
             injection_v: steps(&test, levels_v, self.ahead, rate_hz),
             decimation: 1,
             time_limit_s: 60.0,
-            goes_on: false,
         }
     }
 

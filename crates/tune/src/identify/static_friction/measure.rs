@@ -279,7 +279,6 @@ pub fn measure(
                     injection_v: Vec::new(),
                     decimation: ((run_s * test_axis.info().rate_hz / SAMPLES) as usize).max(1),
                     time_limit_s: 10.0 + 1.5 * run_s,
-                    goes_on: false,
                 },
                 &mut |share| progress((done_s + share * run_s) / all_s),
             )?;

@@ -75,7 +75,6 @@ pub fn measure(
             injection_v: Vec::new(),
             decimation: ((test_axis.info().rate_hz / RATE_HZ) as usize).max(1),
             time_limit_s: 20.0 + 2.0 * duration_s,
-            goes_on: false,
         },
         progress,
     )

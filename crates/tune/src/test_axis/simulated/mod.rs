@@ -37,8 +37,10 @@ const COASTING_TICKS: usize = 20_000;
 const REST_TICKS: usize = 300;
 /// Largest velocity that counts as rest, mm/s.
 const AT_REST_MM_S: f64 = 0.01;
-/// Control periods from the beginning of an experiment that goes on from another to its motion.
+/// Control periods from the beginning of an experiment whose outputs are on to its motion.
 const RUN_TICK: u32 = 100;
+/// Time from one experiment to the next, with the outputs on: what a connected host takes for its requests, s.
+const PAUSE_S: f64 = 0.1;
 /// Names of the axes.
 const NAMES: [&str; 3] = ["x", "y", "z"];
 
@@ -63,7 +65,7 @@ pub struct SimulatedTestAxis {
     interrupted: Option<Recording>,
     /// The axis under test is the first; the others stand still.
     stage: StageSettings,
-    /// The law of the last experiment in closed loop, with the outputs on, for one that goes on from it.
+    /// The law of the last experiment, if its outputs are still on.
     kept: Option<Box<Machine>>,
 }
 
@@ -169,13 +171,6 @@ impl SimulatedTestAxis {
         DacCode::from_volts(volts, self.full_scale_v)
     }
 
-    /// Switches the outputs off that an experiment left on.
-    fn switch_off(&mut self) {
-        if self.kept.take().is_some() {
-            self.move_on(DacCode::ZERO, false);
-        }
-    }
-
     /// Runs the experiment until it ends; to switch the outputs off is the caller's.
     fn drive(
         &mut self,
@@ -226,6 +221,10 @@ impl SimulatedTestAxis {
                 self.move_on(DacCode::ZERO, false);
                 continue;
             };
+            if law.pauses() {
+                self.move_on(step.code, true);
+                continue;
+            }
             let done = recorder.ticks();
             let injection_v = experiment.injection_v.get(done).copied();
             if injection_v.is_none() && step.motion_ended {
@@ -264,17 +263,18 @@ impl SimulatedTestAxis {
             motions: [*motion, MotionSettings::Hold, MotionSettings::Hold],
         };
         let waits_for_motion = *motion != MotionSettings::Hold;
+        let pause = (PAUSE_S * self.stage.rate_hz) as u32;
         let build = || {
             let plan = plan.build(&self.stage)?;
             let Some(mut machine) = kept else {
                 let machine = LawMachine::with_plan(self.stage.build()?, plan).with_x_alone();
-                return Ok((Box::new(machine), Operator::runs_the_plan()));
+                return Ok((Box::new(machine), Operator::runs_the_plan(), 0));
             };
             machine.set_motion(AxisName::X, plan[AxisName::X].clone());
-            let run = waits_for_motion.then_some((RUN_TICK, Command::Run));
-            Ok((machine, Operator::follows(run)))
+            let run = waits_for_motion.then_some((pause + RUN_TICK, Command::Run));
+            Ok((machine, Operator::follows(run), pause))
         };
-        let (machine, operator) = build().map_err(|source| ExperimentError::Motion {
+        let (machine, operator, begins) = build().map_err(|source| ExperimentError::Motion {
             experiment: experiment.name.clone(),
             source,
         })?;
@@ -282,6 +282,7 @@ impl SimulatedTestAxis {
             machine,
             operator,
             tick: 0,
+            begins,
             waits_for_motion,
         })
     }
@@ -294,6 +295,8 @@ enum Law {
         machine: Box<Machine>,
         operator: Operator,
         tick: u32,
+        /// Tick up to which the axis rests from the experiment before.
+        begins: u32,
         /// There is a motion, and it has not begun.
         waits_for_motion: bool,
     },
@@ -314,6 +317,11 @@ impl Law {
             Self::OpenLoop => None,
             Self::ClosedLoop { machine, .. } => Some(machine),
         }
+    }
+
+    /// True while the axis rests from the experiment before.
+    fn pauses(&self) -> bool {
+        matches!(self, Self::ClosedLoop { tick, begins, .. } if tick <= begins)
     }
 
     /// The law's reason to keep the outputs off.
@@ -346,6 +354,7 @@ impl Law {
             operator,
             tick,
             waits_for_motion,
+            ..
         } = self
         else {
             return Ok(Some(Step {
@@ -402,14 +411,17 @@ impl TestAxis for SimulatedTestAxis {
         Ok(())
     }
 
+    fn switch_off(&mut self) {
+        if self.kept.take().is_some() {
+            self.move_on(DacCode::ZERO, false);
+        }
+    }
+
     fn perform(
         &mut self,
         experiment: &Experiment,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, ExperimentError> {
-        if !experiment.goes_on {
-            self.switch_off();
-        }
         let outcome = self.drive(experiment, progress);
         if self.kept.is_none() {
             self.move_on(DacCode::ZERO, false);
