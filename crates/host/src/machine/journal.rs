@@ -33,6 +33,8 @@ pub struct Journal<'a> {
     settings: AxisSettings,
     /// The settings are not in force yet.
     pending: bool,
+    /// The outputs are to be off before the next experiment.
+    begins_off: bool,
     /// The recording of the last experiment, if that was stopped.
     interrupted: Option<Recording>,
     /// Position at the end of the last experiment that was in the folder, mm.
@@ -211,6 +213,7 @@ impl<'a> Journal<'a> {
             folder: folder.to_owned(),
             next: 0,
             known: resume,
+            begins_off: false,
             pending: false,
             interrupted: None,
             left_at_mm: None,
@@ -423,7 +426,9 @@ impl TestAxis for Journal<'_> {
     }
 
     fn switch_off(&mut self) {
-        if !self.known {
+        if self.known {
+            self.begins_off = true;
+        } else {
             self.axis.switch_off();
         }
     }
@@ -447,6 +452,7 @@ impl TestAxis for Journal<'_> {
             })?;
             if let Some(outcome) = kept {
                 self.next += 1;
+                self.begins_off = false;
                 progress(1.0);
                 let recording = outcome.as_ref().ok().or(self.interrupted.as_ref());
                 let end_mm = recording.and_then(|recording| recording.position_mm.last());
@@ -457,6 +463,10 @@ impl TestAxis for Journal<'_> {
         let path = self.path(self.next);
         self.next += 1;
         self.known = false;
+        let begins_off = std::mem::take(&mut self.begins_off);
+        if begins_off {
+            self.axis.switch_off();
+        }
         if self.pending {
             let settings = self.settings.clone();
             self.axis
@@ -469,6 +479,9 @@ impl TestAxis for Journal<'_> {
             && matches!(experiment.drive, Drive::ClosedLoop(_))
         {
             approach(self.axis, left_at_mm)?;
+            if begins_off {
+                self.axis.switch_off();
+            }
         }
         let entry = |recording, stopped| Entry::new(&experiment.name, key, recording, stopped);
         match self.axis.perform(experiment, progress) {

@@ -64,14 +64,16 @@ pub fn commission(
             ran: guard.runs,
             ..found
         }),
-        Err(error) => Err(match guard.ringing() {
-            Some(ringing)
-                if !matches!(error, CommissionError::Rings { .. }) && !error.is_interrupted() =>
-            {
-                CommissionError::rings(ringing, error)
-            }
-            _ => error,
-        }),
+        Err(error) if error.is_interrupted() => Err(error),
+        Err(error) => {
+            guard.switch_off();
+            Err(match guard.ringing() {
+                Some(ringing) if !matches!(error, CommissionError::Rings { .. }) => {
+                    CommissionError::rings(ringing, error)
+                }
+                _ => error,
+            })
+        }
     }
 }
 
@@ -91,7 +93,7 @@ fn guarded(
     })?;
 
     step += 1;
-    test_axis.begin_off(true);
+    test_axis.rest_off(true);
     let found = linear_model(
         test_axis,
         base,
@@ -102,7 +104,7 @@ fn guarded(
             report(watch, step, share);
         },
     );
-    test_axis.begin_off(false);
+    test_axis.rest_off(false);
     let Linear {
         motor,
         response,

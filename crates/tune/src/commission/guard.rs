@@ -57,8 +57,8 @@ pub struct Guard<'a> {
     rings: Option<Ringing>,
     /// The end of the last experiment.
     last: Recording,
-    /// Each experiment begins with the outputs off.
-    begins_off: bool,
+    /// The outputs are off between experiments.
+    rests_off: bool,
 }
 
 impl<'a> Guard<'a> {
@@ -72,14 +72,17 @@ impl<'a> Guard<'a> {
             runs: Vec::new(),
             rings: None,
             last: Recording::default(),
-            begins_off: false,
+            rests_off: false,
         }
     }
 
-    /// Has the outputs switched off before each experiment, or no more. A controller of which nobody knows whether it holds the axis has no
-    /// time to make it swing then, and friction holds an axis that was driven in open loop.
-    pub fn begin_off(&mut self, begins_off: bool) {
-        self.begins_off = begins_off;
+    /// Has the outputs off between experiments from now on, or no more. Until a controller is known to hold the axis, friction does: a loop that
+    /// is not stable has no time to make it swing.
+    pub fn rest_off(&mut self, rests_off: bool) {
+        self.rests_off = rests_off;
+        if rests_off {
+            self.switch_off();
+        }
     }
 
     /// Takes the deceleration by friction into account, mm/s^2.
@@ -226,9 +229,6 @@ impl TestAxis for Guard<'_> {
     ) -> Result<Recording, ExperimentError> {
         self.check_fits(experiment)?;
         self.rings = None;
-        if self.begins_off {
-            self.axis.switch_off();
-        }
         let outcome = self.axis.perform(experiment, progress);
         let stopped = self.axis.interrupted().cloned();
         match (&outcome, stopped) {
@@ -245,6 +245,9 @@ impl TestAxis for Guard<'_> {
                 self.at_mm = None;
             }
             (Err(_), None) => self.at_mm = None,
+        }
+        if self.rests_off && !matches!(outcome, Err(ExperimentError::Interrupted { .. })) {
+            self.switch_off();
         }
         outcome
     }
@@ -304,13 +307,13 @@ mod tests {
     }
 
     #[test]
-    fn an_experiment_that_is_to_begin_with_the_outputs_off_knows_nothing_of_the_last_one() {
-        let first_v = |begins_off: bool| {
+    fn an_experiment_before_which_the_outputs_were_off_knows_nothing_of_the_last_one() {
+        let first_v = |rests_off: bool| {
             let mut axis = SimulatedTestAxis::new(0, x(), 1).with_travel_mm(TRAVEL_MM);
             let mut guard = Guard::new(&mut axis);
             let settings = measured(guard.settings());
             guard.apply(&settings).unwrap();
-            guard.begin_off(begins_off);
+            guard.rest_off(rests_off);
             guard.perform(&to(3.0), &mut |_| {}).unwrap();
             let rest = Experiment {
                 drive: Drive::ClosedLoop(MotionSettings::Hold),

@@ -84,10 +84,10 @@ pub trait TestAxis {
     fn switch_off(&mut self);
 
     /// Runs an experiment from where the axis stands, and records it. `progress` receives the share that is done,
-    /// 0 to 1, a few times a second. After one in closed loop the outputs stay on, and the next goes on with what the law remembers.
+    /// 0 to 1, a few times a second. The outputs may stay on after it: the next one goes on with what the law remembers.
     ///
     /// # Errors
-    /// The error that stopped the experiment; the outputs are off then.
+    /// The error that stopped the experiment.
     fn perform(
         &mut self,
         experiment: &Experiment,

@@ -36,7 +36,7 @@ const ENDS_EXPERIMENTS: [FaultCode; 3] = [
     FaultCode::Overspeed,
     FaultCode::InjectionBounds,
 ];
-/// Time in which the axis comes to rest after one of them.
+/// Time in which the axis comes to rest without its outputs.
 const COASTING: Duration = Duration::from_millis(500);
 /// Reason of an end that nobody asked this session for.
 const SWITCHED_OFF: ClientError = ClientError::Interrupted {
@@ -44,6 +44,13 @@ const SWITCHED_OFF: ClientError = ClientError::Interrupted {
 };
 /// Time in which the outputs come on.
 const ENABLING: Duration = Duration::from_millis(100);
+
+/// Counts by which an axis that stands seems to move.
+const STILL_COUNTS: f64 = 2.5;
+
+fn seconds(seconds: f64) -> Duration {
+    Duration::from_secs_f64(seconds.max(0.0))
+}
 
 /// An axis of a connected machine.
 ///
@@ -61,6 +68,8 @@ pub struct ConnectedAxis<'a> {
     may_be_off: bool,
     /// The recording of the last experiment, if that was stopped.
     interrupted: Option<Recording>,
+    /// The reason why the outputs could not be switched off.
+    not_off: Option<ClientError>,
 }
 
 impl<'a> ConnectedAxis<'a> {
@@ -88,6 +97,7 @@ impl<'a> ConnectedAxis<'a> {
             origin_mm,
             may_be_off: true,
             interrupted: None,
+            not_off: None,
         })
     }
 
@@ -96,6 +106,9 @@ impl<'a> ConnectedAxis<'a> {
         experiment: &Experiment,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, Stop> {
+        if let Some(error) = self.not_off.take() {
+            return Err(error.into());
+        }
         let here = self.enabled()?;
         let motion = match experiment.drive {
             Drive::ClosedLoop(motion) => Some(motion),
@@ -245,14 +258,27 @@ impl<'a> ConnectedAxis<'a> {
         }
     }
 
-    /// Waits for rest and switches the outputs off.
+    /// Waits for the end of the motion, switches the outputs off, and waits for standstill.
     fn disable(&mut self) -> Result<(), ClientError> {
-        let status = settle::rest(self.client, BEFORE)?;
-        if status.state == MachineState::Enabled {
-            self.client.order(Body::Disable)?;
-            self.may_be_off = true;
-            let due = self.client.now() + ENABLING;
-            while self.client.status()?.state == MachineState::Enabled && self.client.now() < due {}
+        let mut status = settle::rest(self.client, BEFORE)?;
+        if status.state != MachineState::Enabled {
+            return Ok(());
+        }
+        self.client.order(Body::Disable)?;
+        self.may_be_off = true;
+        // They stay on until a brake holds.
+        let due = self.client.now() + seconds(self.stage.brake.apply_s) + ENABLING;
+        while status.state == MachineState::Enabled && self.client.now() < due {
+            status = self.client.status()?;
+        }
+        let due = self.client.now() + COASTING;
+        let mut moves = true;
+        while moves && self.client.now() < due {
+            self.client.wait(LOOK)?;
+            let before_mm = status.axes[self.axis as usize].position_mm;
+            status = self.client.status()?;
+            let moved_mm = status.axes[self.axis as usize].position_mm - before_mm;
+            moves = moved_mm.abs() > STILL_COUNTS * self.settings().encoder.resolution_mm;
         }
         Ok(())
     }
@@ -269,6 +295,7 @@ impl<'a> ConnectedAxis<'a> {
             while status.state != MachineState::Enabled && self.client.now() < due {
                 status = self.client.status()?;
             }
+            self.client.wait(seconds(self.stage.brake.release_s))?;
         }
         self.may_be_off = false;
         Ok(status.axes[self.axis as usize].position_mm - self.origin_mm)
@@ -307,7 +334,7 @@ impl TestAxis for ConnectedAxis<'_> {
     }
 
     fn switch_off(&mut self) {
-        let _ = self.disable();
+        self.not_off = self.disable().err();
     }
 
     fn perform(

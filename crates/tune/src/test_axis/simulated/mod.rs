@@ -133,7 +133,8 @@ impl SimulatedTestAxis {
         self.farthest_mm
     }
 
-    /// Loads the table from outside, V at the amplifier input, one a control period from when the outputs are enabled.
+    /// Loads the table from outside, V at the amplifier input, one a control period from the first with enabled outputs that is not
+    /// a pause between experiments.
     pub fn load(&mut self, loads_v: impl IntoIterator<Item = f64>) {
         self.loads_v = loads_v.into_iter().collect();
     }
@@ -141,7 +142,11 @@ impl SimulatedTestAxis {
     /// One control period of the plant.
     fn move_on(&mut self, code: DacCode, enabled: bool) {
         let load_v = self.loads_v.pop_front_if(|_| enabled);
-        self.plant.set_load_v(load_v.unwrap_or(0.0));
+        self.step_plant(code, enabled, load_v.unwrap_or(0.0));
+    }
+
+    fn step_plant(&mut self, code: DacCode, enabled: bool, load_v: f64) {
+        self.plant.set_load_v(load_v);
         self.plant.step(code, enabled);
         let position_mm = self.plant.position_mm() + self.travel.start_mm();
         self.farthest_mm = self.farthest_mm.max(position_mm.abs());
@@ -222,7 +227,13 @@ impl SimulatedTestAxis {
                 continue;
             };
             if law.pauses() {
-                self.move_on(step.code, true);
+                recorder.note(Period {
+                    reference_mm: position_mm + step.error_mm,
+                    position_mm,
+                    voltage_v: self.volts(step.code),
+                    injection_v: 0.0,
+                });
+                self.step_plant(step.code, true, 0.0);
                 continue;
             }
             let done = recorder.ticks();

@@ -51,7 +51,16 @@ impl Recorder {
         self.ticks
     }
 
+    /// Takes a control period among the latest, and not into the recording.
+    pub(super) fn note(&mut self, period: Period) {
+        if self.latest.len() == LATEST {
+            self.latest.pop_front();
+        }
+        self.latest.push_back(period);
+    }
+
     pub(super) fn push(&mut self, period: Period) {
+        self.note(period);
         let Self {
             recording,
             decimation,
@@ -61,10 +70,6 @@ impl Recorder {
             recording.reference_mm.push(period.reference_mm);
             recording.position_mm.push(period.position_mm);
         }
-        if self.latest.len() == LATEST {
-            self.latest.pop_front();
-        }
-        self.latest.push_back(period);
         self.voltage_v += period.voltage_v;
         self.injection_v += period.injection_v;
         self.ticks += 1;
