@@ -293,6 +293,8 @@ fn a_law_that_a_little_less_friction_would_make_worse_than_the_pid_is_replaced_b
     assert!(verification.is_better_than_pid());
     // What is chosen feeds nothing forward on the sines that the table was thrown on.
     let chosen = &verification.settings(&base).feedforward;
+    assert!((0.04..0.05).contains(&chosen.from_mm), "{chosen:?}");
+    assert_eq!(chosen.from_mm_s, 1.6);
     for refused in verification.refused.iter().filter(|one| one.factor > 1.0) {
         if let Some(SmallMotion::Sine(sine, _)) = refused.worse.map(|worse| worse.motion) {
             let spared =
@@ -422,6 +424,8 @@ fn what_was_said_before_it_moved_is_what_it_did() {
         };
         let planned_for = found.ran.iter().filter(|run| !gave_way(&run.name));
         let took_s: f64 = planned_for.map(|run| run.lasted_s).sum();
+        let whole_s: f64 = found.ran.iter().map(|run| run.lasted_s).sum();
+        assert!(whole_s < 1.5 * said_s, "{travel_mm}: {whole_s} s in all");
         let ratio = took_s / said_s;
         assert!(
             (0.7..1.4).contains(&ratio),

@@ -196,7 +196,7 @@ fn short_runs_are_freed_of_the_screws_ripple_and_take_less_than_half_the_time() 
         levels_v.push(slow.map(|run| run.voltage_v).collect::<Vec<_>>());
         lasts_s.push(recordings.iter().map(|run| run.duration_s()).sum::<f64>());
     }
-    assert_eq!(levels_v[0].len(), 10);
+    assert_eq!([levels_v[0].len(), levels_v[1].len()], [10, 10]);
     for (whole_v, short_v) in levels_v[0].iter().zip(&levels_v[1]) {
         assert!((whole_v - short_v).abs() < 0.002, "{levels_v:?}");
     }

@@ -48,10 +48,6 @@ const ENABLING: Duration = Duration::from_millis(100);
 /// Counts by which an axis that stands seems to move.
 const STILL_COUNTS: f64 = 2.5;
 
-fn seconds(seconds: f64) -> Duration {
-    Duration::from_secs_f64(seconds.max(0.0))
-}
-
 /// An axis of a connected machine.
 ///
 /// Experiments run under the machine's own limits and faults, and are recorded by telemetry: as often as they ask for, if
@@ -267,7 +263,7 @@ impl<'a> ConnectedAxis<'a> {
         self.client.order(Body::Disable)?;
         self.may_be_off = true;
         // They stay on until a brake holds.
-        let due = self.client.now() + seconds(self.stage.brake.apply_s) + ENABLING;
+        let due = self.client.now() + Duration::from_secs_f64(self.stage.brake.apply_s) + ENABLING;
         while status.state == MachineState::Enabled && self.client.now() < due {
             status = self.client.status()?;
         }
@@ -295,7 +291,8 @@ impl<'a> ConnectedAxis<'a> {
             while status.state != MachineState::Enabled && self.client.now() < due {
                 status = self.client.status()?;
             }
-            self.client.wait(seconds(self.stage.brake.release_s))?;
+            self.client
+                .wait(Duration::from_secs_f64(self.stage.brake.release_s))?;
         }
         self.may_be_off = false;
         Ok(status.axes[self.axis as usize].position_mm - self.origin_mm)
