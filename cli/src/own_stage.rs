@@ -157,8 +157,8 @@ pub(super) fn refuse_other_hardware(
         ] {
             if (own / given - 1.0).abs() > 1e-9 {
                 bail!(
-                    "--settings have {axis} {what} = {given}, and {} has {own}: give the settings that commissioning this stage left, or \
-                     leave --settings out",
+                    "--settings have {axis} {what} = {given}, and {} has {own}: give the settings that commissioning this stage left, \
+                     leave --settings out, or write the settings' value into the stage's file",
                     stage.path.display()
                 );
             }

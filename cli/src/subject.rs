@@ -304,8 +304,8 @@ mod tests {
             self.axis.apply(settings)
         }
 
-        fn switch_off(&mut self) {
-            self.axis.switch_off();
+        fn switch_off(&mut self) -> Result<(), ExperimentError> {
+            self.axis.switch_off()
         }
 
         fn perform(

@@ -47,8 +47,8 @@ impl TestAxis for Cancellable<'_> {
         self.axis.apply(settings)
     }
 
-    fn switch_off(&mut self) {
-        self.axis.switch_off();
+    fn switch_off(&mut self) -> Result<(), ExperimentError> {
+        self.axis.switch_off()
     }
 
     fn perform(
@@ -59,7 +59,7 @@ impl TestAxis for Cancellable<'_> {
         if self.cancelled.load(Ordering::Relaxed) {
             return Err(ExperimentError::Interrupted {
                 experiment: experiment.name.clone(),
-                done: "the axis stands, its outputs are off",
+                done: "the axis stands, its outputs are off".to_owned(),
             });
         }
         self.axis.perform(experiment, progress)

@@ -342,7 +342,16 @@ impl Job<'_> {
         let Self { axis, output, .. } = self;
         output.ready()?;
         let travel = known_travel(machine, axis, self.travel)?;
-        let before = machine.settings()?;
+        let folder = output.below(axis.as_str());
+        folder.ready()?;
+        let experiments = folder.file(EXPERIMENTS)?;
+        let mut before = machine.settings()?;
+        let kept = experiments.join(Journal::BEFORE);
+        if self.request.resume && kept.exists() {
+            // Where the host has died, a law that was tried may be in force.
+            let first = SettingsFile::read(&kept)?.stage;
+            before.axes[axis as usize] = first.axes[axis as usize].clone();
+        }
         let mut file = match self.start {
             Some(file) => {
                 refuse_restart(&before, &file.stage, axis)?;
@@ -359,9 +368,6 @@ impl Job<'_> {
         if self.travel.is_some() && machine.free_travel(axis)?.is_none() {
             warn_of_origins(axis, &base);
         }
-        let folder = output.below(axis.as_str());
-        folder.ready()?;
-        let experiments = folder.file(EXPERIMENTS)?;
         let words = self
             .request
             .words(output.seed, self.travel, self.stage, &base);
@@ -385,6 +391,7 @@ impl Job<'_> {
             journal
                 .begin(&begun)
                 .with_context(|| format!("cannot write into {}", experiments.display()))?;
+            SettingsFile::new(before.clone()).write(&kept, whole::write)?;
             for path in journal.foreign() {
                 warn!("{} was not written here, and stays", path.display());
             }
@@ -838,8 +845,8 @@ mod tests {
             self.axis.apply(settings)
         }
 
-        fn switch_off(&mut self) {
-            self.axis.switch_off();
+        fn switch_off(&mut self) -> Result<(), ExperimentError> {
+            self.axis.switch_off()
         }
 
         fn perform(
@@ -857,7 +864,7 @@ mod tests {
             if self.interrupted_at.is_some_and(is_cut) {
                 return Err(ExperimentError::Interrupted {
                     experiment: experiment.name.clone(),
-                    done: "the axes have stopped",
+                    done: "the axes have stopped".to_owned(),
                 });
             }
             let mut recording = self.axis.perform(experiment, progress)?;
@@ -1024,6 +1031,14 @@ mod tests {
         assert!(early.contains("nothing is to be resumed"), "{early}");
         let cut = said(commission_into(folder.path(), &mut machine));
         assert!(cut.contains("--resume"), "{cut}");
+        // A host that died left a law that it tried in force.
+        let before = machine.settings().unwrap();
+        let mut tried = before.clone();
+        tried.axes[0].feedback.pid.kp_v_per_mm *= 0.9;
+        machine.load(&tried).unwrap();
+        let again = said(commission_with(folder.path(), &mut machine, &["--resume"]));
+        assert!(again.contains("the line is cut"), "{again}");
+        assert_eq!(machine.settings().unwrap(), before);
         machine.cut_at = None;
         let kept = Journal::count(&folder.path().join("x").join(EXPERIMENTS));
         for options in [

@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use quadrant_host::client::samples::{
     Samples, TelemetryRecorder, arm, capture_state, disarm, least_decimation, read_capture,
 };
-use quadrant_host::client::{Client, columns, settings};
+use quadrant_host::client::{Client, ClientError, columns, settings};
 use quadrant_link::message::{CaptureStatus, Channel, Edge, Event, Level, Notice, Trigger};
 use serde_json::{Value, json};
 
@@ -58,32 +58,54 @@ pub(super) fn record(
         .unwrap_or_else(|| least_decimation(options.channels.len(), rate_hz));
     let mut recording = TelemetryRecorder::start(client, &options.channels, every)?;
     let began = client.now();
-    if !then(session) {
+    if !then(session) && !session.client.is_interrupted() {
         recording.finish(&mut session.client)?;
         bail!("record: nothing was written");
     }
     let client = &mut session.client;
+    let ended = until_rest(&mut recording, client, due.map(|due| (began, due)));
+    // What has come is kept, whatever ended it.
+    let so_far = recording.samples().clone();
+    let (mut samples, ended) = match recording.finish(client) {
+        Ok(samples) => (samples, ended),
+        Err(error) => (so_far, ended.and(Err(error))),
+    };
+    if let Some(due) = due {
+        samples.truncate((due.as_secs_f64() / samples.sample_time_s).round() as usize);
+    }
+    let files = write(&samples, &options.out, &resolutions_mm, options.allow_gaps);
+    match (ended, files) {
+        (Ok(()), files) => Ok(written(&samples, &files?)),
+        (Err(error), Ok(files)) => {
+            let until_then = written(&samples, &files).text;
+            Err(anyhow::Error::new(error).context(format!("{until_then}, until then")))
+        }
+        (Err(error), Err(unwritten)) => Err(anyhow::Error::new(error).context(unwritten)),
+    }
+}
+
+/// Takes the samples that come until the axes rest, or for a time.
+///
+/// # Errors
+/// An interruption, or a connection that is broken.
+fn until_rest(
+    recording: &mut TelemetryRecorder,
+    client: &mut Client,
+    due: Option<(Duration, Duration)>,
+) -> Result<(), ClientError> {
     loop {
-        let elapsed = client.now().saturating_sub(began);
-        let left = due.map_or(MOST, |due| due.saturating_sub(elapsed));
+        let left = due.map_or(MOST, |(began, lasts)| {
+            lasts.saturating_sub(client.now().saturating_sub(began))
+        });
         if left.is_zero() {
             break;
         }
         recording.gather(client, left.min(LOOK))?;
-        if due.is_none() {
-            let status = client.status()?;
-            if !status.running {
-                break;
-            }
+        if due.is_none() && !client.status()?.running {
+            break;
         }
     }
-    recording.gather(client, TAIL)?;
-    let mut samples = recording.finish(client)?;
-    if let Some(due) = due {
-        samples.truncate((due.as_secs_f64() / samples.sample_time_s).round() as usize);
-    }
-    let files = write(&samples, &options.out, &resolutions_mm, options.allow_gaps)?;
-    Ok(written(&samples, &files))
+    recording.gather(client, TAIL)
 }
 
 fn write(
@@ -255,4 +277,46 @@ fn said(event: &Event) -> String {
     let number = format!("fault {code}");
     let named = format!("{number}{}", fault_name(*code));
     format!("{}{more}", event.to_string().replacen(&number, &named, 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use quadrant_host::machine::SimulatedLink;
+    use quadrant_sim::stage_setup::StageSetup;
+
+    use super::*;
+    use crate::connect::printer::Printer;
+
+    #[test]
+    fn a_recording_that_is_interrupted_is_written_up_to_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = SimulatedLink::start(&StageSetup::commissioned(), 1, None).unwrap();
+        let client = Client::open(link).unwrap();
+        let mut session = Session::new(client, Printer { json: false });
+        let channels = ["x.reference", "x.position", "x.error", "x.output"];
+        let options = RecordOptions {
+            channels: channels.map(|name| name.parse().unwrap()).to_vec(),
+            seconds: Some(30.0),
+            every: None,
+            out: folder.path().join("run.csv"),
+            allow_gaps: false,
+            then: Vec::new(),
+        };
+        let then = |session: &mut Session| {
+            session.client.wait(Duration::from_secs(2)).unwrap();
+            session.client.interrupt().request();
+            true
+        };
+        let error = record(&mut session, &options, then).err().unwrap();
+        let said = quadrant_cli::explained(&error);
+        assert!(
+            said.contains("run.csv") && said.contains("interrupted"),
+            "{said}"
+        );
+        let rows = std::fs::read_to_string(&options.out)
+            .unwrap()
+            .lines()
+            .count();
+        assert!(rows > 100, "{rows}");
+    }
 }

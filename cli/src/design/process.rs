@@ -8,6 +8,7 @@ use quadrant_cli::axis::Axis;
 use quadrant_cli::output::Output;
 use quadrant_cli::{say, warn};
 use quadrant_law::control::filter::FilterSettings;
+use quadrant_law::control::pid::PidGains;
 use quadrant_law::control::plant_model::PlantModel;
 use quadrant_settings::AxisSettings;
 use quadrant_sim::settings_file::SettingsFile;
@@ -151,6 +152,9 @@ impl Model {
         let axis = &mut file.stage.axes[self.axis.index()];
         let feedback = axis.feedback.clone();
         change(axis);
+        if are_rounded(&axis.feedback.pid, &feedback.pid) {
+            axis.feedback.pid = feedback.pid;
+        }
         if axis.commissioned && axis.feedback != feedback {
             warn!(
                 "note: {name} was commissioned under the other gains, and its feedforward was tried with them; `quadrant commission \
@@ -173,5 +177,45 @@ impl Model {
             self.axis.name()
         );
         Ok(())
+    }
+}
+
+/// Relative difference of two gains that rounding makes.
+const ROUNDING: f64 = 1e-9;
+
+/// True if gains differ by rounding at most.
+fn are_rounded(found: &PidGains, before: &PidGains) -> bool {
+    let values = |gains: &PidGains| {
+        [
+            gains.kp_v_per_mm,
+            gains.ki_v_per_mm_s,
+            gains.kd_v_s_per_mm,
+            gains.derivative_filter_s,
+        ]
+    };
+    let pairs = values(found).into_iter().zip(values(before));
+    pairs
+        .into_iter()
+        .all(|(found, before)| (found - before).abs() <= ROUNDING * before.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gains_that_differ_by_rounding_alone_are_the_same_gains() {
+        let before = PidGains {
+            kp_v_per_mm: 1.329_923_982_666_029,
+            ki_v_per_mm_s: 146.0,
+            kd_v_s_per_mm: 5.5e-3,
+            derivative_filter_s: 1e-4,
+        };
+        let with_kp = |kp_v_per_mm| PidGains {
+            kp_v_per_mm,
+            ..before
+        };
+        assert!(are_rounded(&with_kp(1.329_923_982_666_029_4), &before));
+        assert!(!are_rounded(&with_kp(1.3300), &before));
     }
 }

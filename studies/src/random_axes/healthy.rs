@@ -138,12 +138,7 @@ fn to_and_fro(
         if let Err(error) = outcome {
             // The next move begins in the middle again.
             let _ = approach(axis, 0.0);
-            let is_near = limits.overspeed_ratio * max_velocity_mm_s > limits.max_velocity_mm_s;
-            return match error {
-                // A fast move that overshoots the limit, which the firmware's own is above by this ratio.
-                ExperimentError::Overspeed { .. } if is_near => Ok(()),
-                error => Err(error.to_string()),
-            };
+            return Err(error.to_string());
         }
     }
     Ok(())

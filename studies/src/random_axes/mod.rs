@@ -279,8 +279,8 @@ impl TestAxis for Timed<'_> {
         self.bench.axis_mut().apply(settings)
     }
 
-    fn switch_off(&mut self) {
-        self.bench.axis_mut().switch_off();
+    fn switch_off(&mut self) -> Result<(), ExperimentError> {
+        self.bench.axis_mut().switch_off()
     }
 
     fn perform(

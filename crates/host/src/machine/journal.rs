@@ -1,5 +1,6 @@
 //! A journal of experiments: each is kept when it has ended, so that a series that was interrupted goes on where it stood.
 
+use std::ffi::OsStr;
 use std::fs::{self, FileType};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
@@ -194,6 +195,9 @@ impl Stopped {
 }
 
 impl<'a> Journal<'a> {
+    /// Name of a file in the folder with the settings that the machine had before: whoever begins a series may keep them there.
+    pub const BEFORE: &'static str = "before.toml";
+
     /// A journal in a folder, which is made. Without `resume`, the experiments there are deleted, and [nothing
     /// else](Self::foreign).
     ///
@@ -376,8 +380,9 @@ fn is_named(path: &Path) -> bool {
 /// It has the name of an experiment, and is none: a journal would write over it.
 fn is_own(path: &Path, kind: FileType) -> io::Result<bool> {
     if !is_named(path) {
-        let is_request = path.file_name().is_some_and(|name| name == REQUEST);
-        return Ok(kind.is_file() && (is_request || whole::is_unfinished(path)));
+        let is_own = |name: &OsStr| name == REQUEST || name == Journal::BEFORE;
+        let is_named = path.file_name().is_some_and(is_own);
+        return Ok(kind.is_file() && (is_named || whole::is_unfinished(path)));
     }
     let is_entry = kind.is_file() && serde_json::from_slice::<Entry>(&fs::read(path)?).is_ok();
     match is_entry {
@@ -425,12 +430,12 @@ impl TestAxis for Journal<'_> {
         Ok(())
     }
 
-    fn switch_off(&mut self) {
+    fn switch_off(&mut self) -> Result<(), ExperimentError> {
         if self.known {
             self.begins_off = true;
-        } else {
-            self.axis.switch_off();
+            return Ok(());
         }
+        self.axis.switch_off()
     }
 
     fn perform(
@@ -465,7 +470,7 @@ impl TestAxis for Journal<'_> {
         self.known = false;
         let begins_off = std::mem::take(&mut self.begins_off);
         if begins_off {
-            self.axis.switch_off();
+            self.axis.switch_off()?;
         }
         if self.pending {
             let settings = self.settings.clone();
@@ -475,12 +480,13 @@ impl TestAxis for Journal<'_> {
             self.pending = false;
         }
         // What holds its axis goes on where the series was interrupted.
-        if let Some(left_at_mm) = self.left_at_mm.take()
-            && matches!(experiment.drive, Drive::ClosedLoop(_))
+        if matches!(experiment.drive, Drive::ClosedLoop(_))
+            && let Some(left_at_mm) = self.left_at_mm.take()
         {
-            approach(self.axis, left_at_mm)?;
             if begins_off {
-                self.axis.switch_off();
+                approach(&mut RestsOff(self.axis), left_at_mm)?;
+            } else {
+                approach(self.axis, left_at_mm)?;
             }
         }
         let entry = |recording, stopped| Entry::new(&experiment.name, key, recording, stopped);
@@ -505,6 +511,37 @@ impl TestAxis for Journal<'_> {
 
     fn interrupted(&self) -> Option<&Recording> {
         self.interrupted.as_ref()
+    }
+}
+
+/// An axis whose outputs are off between experiments.
+struct RestsOff<'a>(&'a mut dyn TestAxis);
+
+impl TestAxis for RestsOff<'_> {
+    fn info(&self) -> AxisInfo {
+        self.0.info()
+    }
+
+    fn settings(&self) -> &AxisSettings {
+        self.0.settings()
+    }
+
+    fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
+        self.0.apply(settings)
+    }
+
+    fn switch_off(&mut self) -> Result<(), ExperimentError> {
+        self.0.switch_off()
+    }
+
+    fn perform(
+        &mut self,
+        experiment: &Experiment,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Recording, ExperimentError> {
+        let recording = self.0.perform(experiment, progress)?;
+        self.0.switch_off()?;
+        Ok(recording)
     }
 }
 
@@ -640,6 +677,62 @@ mod tests {
             left_mm > 4.0 && difference_mm < 0.2,
             "{left_mm} {difference_mm}"
         );
+    }
+
+    /// An axis with an account of what it was asked for.
+    struct Asked(SimulatedTestAxis, Vec<String>);
+
+    impl TestAxis for Asked {
+        fn info(&self) -> AxisInfo {
+            self.0.info()
+        }
+
+        fn settings(&self) -> &AxisSettings {
+            self.0.settings()
+        }
+
+        fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
+            self.0.apply(settings)
+        }
+
+        fn switch_off(&mut self) -> Result<(), ExperimentError> {
+            self.1.push("off".to_owned());
+            self.0.switch_off()
+        }
+
+        fn perform(
+            &mut self,
+            experiment: &Experiment,
+            progress: &mut dyn FnMut(f64),
+        ) -> Result<Recording, ExperimentError> {
+            self.1.push(experiment.name.clone());
+            self.0.perform(experiment, progress)
+        }
+    }
+
+    #[test]
+    fn a_series_whose_outputs_rest_off_goes_on_with_outputs_that_rest_off() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut first, mut again) = (axis(), Asked(axis(), Vec::new()));
+        let mut journal = Journal::open(&mut first, folder.path(), false).unwrap();
+        approach(&mut journal, 5.0).unwrap();
+        let mut journal = Journal::open(&mut again, folder.path(), true).unwrap();
+        approach(&mut journal, 5.0).unwrap();
+        journal.switch_off().unwrap();
+        // In open loop nothing goes back to where the axis was left, and with the next one it does.
+        journal.perform(&hold(50), &mut |_| {}).unwrap();
+        assert_eq!(again.1, ["off", "50 ticks"]);
+        let mut again = Asked(axis(), Vec::new());
+        let mut journal = Journal::open(&mut again, folder.path(), true).unwrap();
+        approach(&mut journal, 5.0).unwrap();
+        journal.switch_off().unwrap();
+        approach(&mut journal, 1.0).unwrap();
+        let asked = &again.1;
+        let first_own = 1 + asked.iter().rposition(|entry| entry == "off").unwrap();
+        assert!(first_own > 3, "{asked:?}");
+        for pair in asked[..first_own].windows(2) {
+            assert!(pair.iter().any(|entry| entry == "off"), "{asked:?}");
+        }
     }
 
     #[test]

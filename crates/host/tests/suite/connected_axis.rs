@@ -372,7 +372,7 @@ fn the_outputs_stay_on_after_an_experiment_until_they_are_switched_off_and_come_
         for off in switches {
             axis.perform(&hold, &mut |_| {}).unwrap();
             if *off {
-                axis.switch_off();
+                axis.switch_off().unwrap();
             }
         }
         client.status().unwrap().state

@@ -5,4 +5,5 @@
 mod connected_axis;
 mod host_motions;
 mod hostile_link;
+mod outputs_off;
 mod simulated_machine;

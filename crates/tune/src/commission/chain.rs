@@ -13,6 +13,7 @@ use super::rest::Knock;
 use super::ringing::Ringing;
 use super::velocity_mode;
 use super::verify::{Verification, VerifyError, verify};
+use crate::identify::frf::FrfError;
 use crate::identify::motor_constant::{self, MotorConstantSettings};
 use crate::identify::static_friction::{
     self, FrictionFit, FrictionFitError, FrictionMap, KnownViscous, StaticFrictionError,
@@ -51,7 +52,8 @@ impl<F: FnMut(&'static str, f64)> Watch for F {
 /// too, if the request has margins for the PID.
 ///
 /// # Errors
-/// The first step that fails, with the reason and a remedy; the axis is left at rest, its outputs off.
+/// The first step that fails, with the reason and a remedy; the axis is left at rest, its outputs off, but for an interruption: what
+/// interrupts leaves the axis as it says.
 pub fn commission(
     test_axis: &mut dyn TestAxis,
     base: &AxisSettings,
@@ -66,12 +68,18 @@ pub fn commission(
         }),
         Err(error) if error.is_interrupted() => Err(error),
         Err(error) => {
-            guard.switch_off();
-            Err(match guard.ringing() {
+            let error = match guard.ringing() {
                 Some(ringing) if !matches!(error, CommissionError::Rings { .. }) => {
                     CommissionError::rings(ringing, error)
                 }
                 _ => error,
+            };
+            Err(match guard.switch_off() {
+                Ok(()) => error,
+                Err(reason) => CommissionError::StaysOn {
+                    source: Box::new(error),
+                    reason,
+                },
             })
         }
     }
@@ -93,7 +101,7 @@ fn guarded(
     })?;
 
     step += 1;
-    test_axis.rest_off(true);
+    test_axis.rest_off(true).map_err(FrfError::from)?;
     let found = linear_model(
         test_axis,
         base,
@@ -104,7 +112,7 @@ fn guarded(
             report(watch, step, share);
         },
     );
-    test_axis.rest_off(false);
+    test_axis.rest_off(false).map_err(FrfError::from)?;
     let Linear {
         motor,
         response,

@@ -76,6 +76,14 @@ pub enum CommissionError {
         /// What stopped it.
         source: Box<CommissionError>,
     },
+    /// The outputs could not be switched off after another error, or a fault was found as they were.
+    #[error("{source}; then, {reason}")]
+    StaysOn {
+        /// What ended it.
+        source: Box<CommissionError>,
+        /// What was found.
+        reason: ExperimentError,
+    },
     /// The sine could not be run.
     #[error("verdict: {0}")]
     Verify(#[from] VerifyError),
@@ -96,7 +104,7 @@ impl CommissionError {
             | Self::Friction(StaticFrictionError::Experiment(error))
             | Self::Revise(ReviseError::Experiment(error))
             | Self::Verify(VerifyError::TestAxis(error)) => Some(error),
-            Self::Rings { source, .. } => source.experiment(),
+            Self::Rings { source, .. } | Self::StaysOn { source, .. } => source.experiment(),
             _ => None,
         }
     }
@@ -119,7 +127,7 @@ mod tests {
     fn an_interruption_is_found_below_every_step() {
         let experiment = || ExperimentError::Interrupted {
             experiment: "moving".to_owned(),
-            done: "the axes have stopped",
+            done: "the axes have stopped".to_owned(),
         };
         let response = CommissionError::Response(FrfError::from(experiment()));
         for error in [

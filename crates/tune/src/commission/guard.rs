@@ -78,11 +78,15 @@ impl<'a> Guard<'a> {
 
     /// Has the outputs off between experiments from now on, or no more. Until a controller is known to hold the axis, friction does: a loop that
     /// is not stable has no time to make it swing.
-    pub fn rest_off(&mut self, rests_off: bool) {
+    ///
+    /// # Errors
+    /// Outputs that may still be on.
+    pub fn rest_off(&mut self, rests_off: bool) -> Result<(), ExperimentError> {
         self.rests_off = rests_off;
         if rests_off {
-            self.switch_off();
+            self.switch_off()?;
         }
+        Ok(())
     }
 
     /// Takes the deceleration by friction into account, mm/s^2.
@@ -218,8 +222,8 @@ impl TestAxis for Guard<'_> {
         self.axis.apply(&self.limited(settings))
     }
 
-    fn switch_off(&mut self) {
-        self.axis.switch_off();
+    fn switch_off(&mut self) -> Result<(), ExperimentError> {
+        self.axis.switch_off()
     }
 
     fn perform(
@@ -247,7 +251,8 @@ impl TestAxis for Guard<'_> {
             (Err(_), None) => self.at_mm = None,
         }
         if self.rests_off && !matches!(outcome, Err(ExperimentError::Interrupted { .. })) {
-            self.switch_off();
+            let off = self.switch_off();
+            return outcome.and_then(|recording| off.map(|()| recording));
         }
         outcome
     }
@@ -313,7 +318,7 @@ mod tests {
             let mut guard = Guard::new(&mut axis);
             let settings = measured(guard.settings());
             guard.apply(&settings).unwrap();
-            guard.rest_off(rests_off);
+            guard.rest_off(rests_off).unwrap();
             guard.perform(&to(3.0), &mut |_| {}).unwrap();
             let rest = Experiment {
                 drive: Drive::ClosedLoop(MotionSettings::Hold),

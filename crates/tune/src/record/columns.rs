@@ -391,7 +391,7 @@ impl Header<'_> {
         match self.names.as_slice() {
             [only] if only.contains([';', '\t']) => ". Cells must be separated by commas",
             names if names.len() >= 2 && names.iter().all(|name| name.parse::<f64>().is_err()) => {
-                ". `identify motion --columns time=...,position=...,voltage=...` takes other names"
+                ". Rename the columns; or `identify motion --columns time=...,position=...,voltage=...`, which takes other names"
             }
             names if !names.is_empty() && names.iter().all(|name| name.parse::<f64>().is_ok()) => {
                 ". The first line must name the columns"

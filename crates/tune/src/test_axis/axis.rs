@@ -53,7 +53,7 @@ pub struct AxisInfo {
     pub travel_mm: f64,
     /// Position in which the axis stood first, mm.
     pub start_mm: f64,
-    /// Largest velocity, mm/s; an experiment that exceeds it is stopped.
+    /// Largest velocity, mm/s; an experiment in open loop that exceeds it is stopped, and a faster motion is refused.
     pub max_velocity_mm_s: f64,
     /// Largest acceleration, mm/s^2; a motion that exceeds it is refused.
     pub max_acceleration_mm_s2: f64,
@@ -80,8 +80,11 @@ pub trait TestAxis {
     /// Settings that are refused, here or by the machine, or a connection that is broken; the old ones stay in force.
     fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError>;
 
-    /// Switches the outputs off until the next experiment, which says so where they cannot be.
-    fn switch_off(&mut self);
+    /// Switches the outputs off until the next experiment.
+    ///
+    /// # Errors
+    /// Outputs that may still be on.
+    fn switch_off(&mut self) -> Result<(), ExperimentError>;
 
     /// Runs an experiment from where the axis stands, and records it. `progress` receives the share that is done,
     /// 0 to 1, a few times a second. The outputs may stay on after it: the next one goes on with what the law remembers.
@@ -225,18 +228,18 @@ pub enum ExperimentError {
         /// Description of what is missing, or failed.
         reason: String,
     },
-    /// A person asked to stop.
+    /// A person asked to stop, or the machine keeps its outputs off for a reason that is none of this axis: no other experiment is tried.
     #[error("interrupted in {experiment}: {done}")]
     Interrupted {
         /// Name of the experiment.
         experiment: String,
-        /// State of the axes since.
-        done: &'static str,
+        /// State of the axes since, or the machine's reason.
+        done: String,
     },
     /// The axis left its travel.
     #[error(
         "{experiment}: the axis left its travel of +-{travel_mm} mm after {time_s:.3} s; \
-         lower the excitation's amplitude or duration, or raise its lowest frequency"
+         give it more travel, or a weaker or shorter excitation"
     )]
     Travel {
         /// Name of the experiment.
@@ -248,7 +251,8 @@ pub enum ExperimentError {
     },
     /// The axis ran too fast.
     #[error(
-        "{experiment}: the axis exceeded {max_velocity_mm_s} mm/s after {time_s:.3} s; lower the excitation's amplitude"
+        "{experiment}: the axis exceeded {max_velocity_mm_s} mm/s after {time_s:.3} s; raise max_velocity_mm_s, if it may be that fast, or \
+         give it a weaker or shorter excitation"
     )]
     Overspeed {
         /// Name of the experiment.

@@ -93,6 +93,26 @@ fn an_axis_is_commissioned_and_checked_at_other_rates_and_within_lower_limits() 
         });
 }
 
+#[test]
+fn an_axis_of_6_or_12_mm_s_is_commissioned() {
+    [6.0, 12.0].into_par_iter().for_each(|velocity| {
+        let mut base = StageSettings::simulated().axes[0].clone();
+        base.limits.max_velocity_mm_s = velocity;
+        base.limits.max_acceleration_mm_s2 = 10.0 * velocity;
+        let mut stage = StageSettings::simulated();
+        stage.axes[0] = base.clone();
+        let mut axis = SimulatedTestAxis::under(&stage, 0, x(), 1).with_travel_mm(50.0);
+        let request = CommissionSettings::default();
+        let found = commission(&mut axis, &base, &request, &mut |_, _| {})
+            .unwrap_or_else(|error| panic!("{velocity} mm/s: {error}"));
+        let verification = found.verification.as_ref().unwrap();
+        println!("{velocity} mm/s: {:?}", found.notes());
+        assert!(verification.is_better_than_pid(), "{:?}", found.notes());
+        let gain = found.plant.plant.gain_mm_per_v_s2 / x().gain_mm_per_v_s2;
+        assert!((gain - 1.0).abs() < 0.25, "{velocity} mm/s: A {gain}");
+    });
+}
+
 /// Friction of an axis that is warm, over that of the cold one.
 const MOST_RISEN: f64 = 2.2;
 
@@ -116,8 +136,8 @@ impl TestAxis for Warming {
         self.axis.apply(settings)
     }
 
-    fn switch_off(&mut self) {
-        self.axis.switch_off();
+    fn switch_off(&mut self) -> Result<(), ExperimentError> {
+        self.axis.switch_off()
     }
 
     fn perform(
@@ -183,8 +203,8 @@ impl TestAxis for StopsWhenSmall {
         self.0.apply(settings)
     }
 
-    fn switch_off(&mut self) {
-        self.0.switch_off();
+    fn switch_off(&mut self) -> Result<(), ExperimentError> {
+        self.0.switch_off()
     }
 
     fn perform(
@@ -244,8 +264,8 @@ impl TestAxis for ThrownByTooMuch {
         self.axis.apply(settings)
     }
 
-    fn switch_off(&mut self) {
-        self.axis.switch_off();
+    fn switch_off(&mut self) -> Result<(), ExperimentError> {
+        self.axis.switch_off()
     }
 
     fn perform(
@@ -577,8 +597,8 @@ impl TestAxis for ShakesOnce {
         self.0.apply(settings)
     }
 
-    fn switch_off(&mut self) {
-        self.0.switch_off();
+    fn switch_off(&mut self) -> Result<(), ExperimentError> {
+        self.0.switch_off()
     }
 
     fn perform(

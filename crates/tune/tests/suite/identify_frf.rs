@@ -350,8 +350,8 @@ impl TestAxis for Coarse {
         self.0.apply(settings)
     }
 
-    fn switch_off(&mut self) {
-        self.0.switch_off();
+    fn switch_off(&mut self) -> Result<(), ExperimentError> {
+        self.0.switch_off()
     }
 
     fn perform(

@@ -70,7 +70,7 @@ fn an_experiment_goes_on_with_what_the_law_held_unless_the_outputs_were_switched
     let (share, moved_um) = begins_at_v(|_| {});
     println!("{share} of the voltage, {moved_um} um");
     assert!((share - 1.0).abs() < 0.2 && moved_um < 0.01);
-    let (share, _) = begins_at_v(|axis| axis.switch_off());
+    let (share, _) = begins_at_v(|axis| axis.switch_off().unwrap());
     assert!(share.abs() < 0.2, "{share}");
     let (share, _) = begins_at_v(|axis| {
         let mut settings = axis.settings().clone();
@@ -150,6 +150,24 @@ fn an_axis_that_runs_away_is_stopped() {
         matches!(error, ExperimentError::Overspeed { .. }),
         "{error}"
     );
+}
+
+#[test]
+fn an_axis_that_slips_is_not_stopped_below_the_speed_at_which_a_machine_would() {
+    let mut test_axis = test_axis(1);
+    let mut settings = test_axis.settings().clone();
+    settings.limits.max_velocity_mm_s = 21.0;
+    test_axis.apply(&settings).unwrap();
+    // A load throws it beyond the limit, and not beyond a quarter more.
+    let loads_v = std::iter::repeat_n(0.0, 5_000).chain(std::iter::repeat_n(0.1, 7));
+    test_axis.load(loads_v);
+    let recording = perform(&mut test_axis, &experiment(moving(20.0), Vec::new())).unwrap();
+    let speeds = recording.position_mm.windows(21);
+    let fastest = speeds
+        .map(|part| (part[20] - part[0]) * 500.0)
+        .fold(0.0, f64::max);
+    println!("{fastest} mm/s");
+    assert!((21.0..26.0).contains(&fastest), "{fastest}");
 }
 
 #[test]

@@ -36,8 +36,8 @@ const ENDS_EXPERIMENTS: [FaultCode; 3] = [
     FaultCode::Overspeed,
     FaultCode::InjectionBounds,
 ];
-/// Time in which the axis comes to rest without its outputs.
-const COASTING: Duration = Duration::from_millis(500);
+/// Time in which axes come to rest without their outputs.
+const COASTING: Duration = Duration::from_secs(5);
 /// Reason of an end that nobody asked this session for.
 const SWITCHED_OFF: ClientError = ClientError::Interrupted {
     done: "the outputs went off, and not by this program: an operator, another host, or LinuxCNC's machine on",
@@ -45,8 +45,9 @@ const SWITCHED_OFF: ClientError = ClientError::Interrupted {
 /// Time in which the outputs come on.
 const ENABLING: Duration = Duration::from_millis(100);
 
-/// Counts by which an axis that stands seems to move.
+/// Counts by which an axis that stands seems to move from one look to the next, and way that is as little, mm: noise, or creeping.
 const STILL_COUNTS: f64 = 2.5;
+const STILL_MM: f64 = 0.02;
 
 /// An axis of a connected machine.
 ///
@@ -64,8 +65,8 @@ pub struct ConnectedAxis<'a> {
     may_be_off: bool,
     /// The recording of the last experiment, if that was stopped.
     interrupted: Option<Recording>,
-    /// The reason why the outputs could not be switched off.
-    not_off: Option<ClientError>,
+    /// The error after which nothing is ordered any more: a person has to see to the machine first.
+    ended: Option<ExperimentError>,
 }
 
 impl<'a> ConnectedAxis<'a> {
@@ -93,7 +94,7 @@ impl<'a> ConnectedAxis<'a> {
             origin_mm,
             may_be_off: true,
             interrupted: None,
-            not_off: None,
+            ended: None,
         })
     }
 
@@ -102,9 +103,6 @@ impl<'a> ConnectedAxis<'a> {
         experiment: &Experiment,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, Stop> {
-        if let Some(error) = self.not_off.take() {
-            return Err(error.into());
-        }
         let here = self.enabled()?;
         let motion = match experiment.drive {
             Drive::ClosedLoop(motion) => Some(motion),
@@ -233,16 +231,52 @@ impl<'a> ConnectedAxis<'a> {
         }
     }
 
-    /// Resets a fault that the limits of an experiment are for, once the axis has come to rest: the next experiment may go on.
-    fn reset(&mut self, error: &ExperimentError) {
-        let ExperimentError::Fault { fault, .. } = error else {
-            return;
-        };
-        if ENDS_EXPERIMENTS.contains(&fault.code) {
-            // Where it cannot be reset, the next experiment says so.
-            let _ = self.client.wait(COASTING);
-            let _ = self.client.order(Body::ResetFault);
-            self.may_be_off = true;
+    /// True if other experiments may follow one that ended early. A fault that this axis' limits are for is reset, once all axes have
+    /// come to rest.
+    fn goes_on_after(&mut self, error: &ExperimentError) -> bool {
+        match error {
+            ExperimentError::Interrupted { .. } => false,
+            ExperimentError::Fault { fault, .. } => {
+                let is_own = ENDS_EXPERIMENTS.contains(&fault.code);
+                if is_own {
+                    // Where it cannot be reset, the next experiment says so.
+                    let _ = self.standstill();
+                    let _ = self.client.order(Body::ResetFault);
+                    self.may_be_off = true;
+                }
+                is_own
+            }
+            _ => true,
+        }
+    }
+
+    /// Waits until no axis moves, with the outputs off.
+    fn standstill(&mut self) -> Result<(), ClientError> {
+        let due = self.client.now() + COASTING;
+        let mut before = self.client.status()?.axes;
+        loop {
+            self.client.wait(LOOK)?;
+            let axes = self.client.status()?.axes;
+            let stage = &self.stage.axes;
+            let moves = before
+                .iter()
+                .zip(&axes)
+                .zip(stage)
+                .any(|((before, now), axis)| {
+                    let still_mm = STILL_MM.max(STILL_COUNTS * axis.encoder.resolution_mm);
+                    (now.position_mm - before.position_mm).abs() > still_mm
+                });
+            if !moves {
+                return Ok(());
+            }
+            if self.client.now() >= due {
+                return Err(ClientError::TimedOut {
+                    what: "wait for standstill",
+                    waited_s: COASTING.as_secs_f64(),
+                    remedy: "an axis moves though the outputs are off: see to its brake",
+                });
+            }
+            before = axes;
         }
     }
 
@@ -254,45 +288,47 @@ impl<'a> ConnectedAxis<'a> {
         }
     }
 
-    /// Waits for the end of the motion, switches the outputs off, and waits for standstill.
+    /// Waits for the end of the motion, switches the outputs off, and waits for standstill. What ended the motion otherwise is said once
+    /// they are off.
     fn disable(&mut self) -> Result<(), ClientError> {
-        let mut status = settle::rest(self.client, BEFORE)?;
-        if status.state != MachineState::Enabled {
+        let rested = settle::rest(self.client, BEFORE);
+        if !self.client.status()?.state.drives() {
             return Ok(());
         }
         self.client.order(Body::Disable)?;
         self.may_be_off = true;
         // They stay on until a brake holds.
-        let due = self.client.now() + Duration::from_secs_f64(self.stage.brake.apply_s) + ENABLING;
-        while status.state == MachineState::Enabled && self.client.now() < due {
-            status = self.client.status()?;
+        let patience = Duration::from_secs_f64(self.stage.brake.apply_s) + ENABLING;
+        let due = self.client.now() + patience;
+        while self.client.status()?.state.drives() {
+            if self.client.now() >= due {
+                return Err(ClientError::TimedOut {
+                    what: "disable",
+                    waited_s: patience.as_secs_f64(),
+                    remedy: "the outputs are still on; press the emergency stop",
+                });
+            }
         }
-        let due = self.client.now() + COASTING;
-        let mut moves = true;
-        while moves && self.client.now() < due {
-            self.client.wait(LOOK)?;
-            let before_mm = status.axes[self.axis as usize].position_mm;
-            status = self.client.status()?;
-            let moved_mm = status.axes[self.axis as usize].position_mm - before_mm;
-            moves = moved_mm.abs() > STILL_COUNTS * self.settings().encoder.resolution_mm;
-        }
-        Ok(())
+        self.standstill()?;
+        rested.map(|_| ())
     }
 
     /// Waits for rest, with the outputs on; says where the axis is. Outputs that somebody else has switched off stay off.
-    fn enabled(&mut self) -> Result<f64, ClientError> {
+    fn enabled(&mut self) -> Result<f64, Stop> {
         let mut status = settle::rest(self.client, BEFORE)?;
         if status.state == MachineState::Disabled && !self.may_be_off {
-            return Err(SWITCHED_OFF);
+            return Err(SWITCHED_OFF.into());
         }
         if status.state != MachineState::Enabled {
-            self.client.order(Body::Enable)?;
+            self.standstill().map_err(Stop::not_enabled)?;
+            self.client.order(Body::Enable).map_err(Stop::not_enabled)?;
             let due = self.client.now() + ENABLING;
             while status.state != MachineState::Enabled && self.client.now() < due {
                 status = self.client.status()?;
             }
             self.client
                 .wait(Duration::from_secs_f64(self.stage.brake.release_s))?;
+            status = self.client.status()?;
         }
         self.may_be_off = false;
         Ok(status.axes[self.axis as usize].position_mm - self.origin_mm)
@@ -330,8 +366,11 @@ impl TestAxis for ConnectedAxis<'_> {
         Ok(())
     }
 
-    fn switch_off(&mut self) {
-        self.not_off = self.disable().err();
+    fn switch_off(&mut self) -> Result<(), ExperimentError> {
+        self.disable().map_err(|error| {
+            let error = Stop::from(error).into_error("switching the outputs off", self.axis, 0.0);
+            self.ended.get_or_insert(error).clone()
+        })
     }
 
     fn perform(
@@ -340,9 +379,14 @@ impl TestAxis for ConnectedAxis<'_> {
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, ExperimentError> {
         self.interrupted = None;
+        if let Some(error) = &self.ended {
+            return Err(error.clone());
+        }
         self.run(experiment, progress).map_err(|stop| {
-            let error = stop.into_error(experiment);
-            self.reset(&error);
+            let error = stop.into_error(&experiment.name, self.axis, experiment.time_limit_s);
+            if !self.goes_on_after(&error) {
+                self.ended = Some(error.clone());
+            }
             error
         })
     }

@@ -1,8 +1,9 @@
 //! End of an experiment on a connected axis: put out in full, or stopped.
 
+use quadrant_law::axes::AxisName;
 use quadrant_law::safety::{Fault, FaultCode};
 use quadrant_link::message::InjectStatus;
-use quadrant_tune::test_axis::{Experiment, ExperimentError};
+use quadrant_tune::test_axis::ExperimentError;
 
 use crate::client::error::ClientError;
 
@@ -15,6 +16,8 @@ pub(super) struct Injected {
 /// Reason why an experiment ended early.
 pub(super) enum Stop {
     Client(Box<ClientError>),
+    /// The machine keeps its outputs off.
+    NotEnabled(Box<ClientError>),
     TimedOut,
     Lost(u64),
     /// The injection was broken off.
@@ -30,17 +33,41 @@ impl From<ClientError> for Stop {
 }
 
 impl Stop {
-    pub(super) fn into_error(self, experiment: &Experiment) -> ExperimentError {
-        let name = experiment.name.clone();
+    /// A failure before the outputs were on: a machine that refuses them, or moves without them, has a reason that a person is to see to.
+    pub(super) fn not_enabled(error: ClientError) -> Self {
+        match error {
+            ClientError::Refused { .. } | ClientError::TimedOut { .. } => {
+                Self::NotEnabled(Box::new(error))
+            }
+            other => other.into(),
+        }
+    }
+
+    /// The end of an experiment of this name on `axis`, that may take so long, s.
+    pub(super) fn into_error(
+        self,
+        name: &str,
+        axis: AxisName,
+        time_limit_s: f64,
+    ) -> ExperimentError {
+        let name = name.to_owned();
+        let interrupted = |done: String| ExperimentError::Interrupted {
+            experiment: name.clone(),
+            done,
+        };
         let reason = match self {
             Self::TimedOut => {
                 return ExperimentError::TimedOut {
                     experiment: name,
-                    time_limit_s: experiment.time_limit_s,
+                    time_limit_s,
                     reason: "the motion has not ended",
                 };
             }
+            Self::NotEnabled(error) => return interrupted(error.to_string()),
             Self::Client(error) => match *error {
+                ClientError::Fault {
+                    axis: Some(other), ..
+                } if other != axis => return interrupted(error.to_string()),
                 ClientError::Fault {
                     code, axis, tick, ..
                 } if FaultCode::from_number(code).is_some() => {
@@ -51,12 +78,7 @@ impl Stop {
                         fault,
                     };
                 }
-                ClientError::Interrupted { done } => {
-                    return ExperimentError::Interrupted {
-                        experiment: name,
-                        done,
-                    };
-                }
+                ClientError::Interrupted { done } => return interrupted(done.to_owned()),
                 other => other.to_string(),
             },
             Self::Lost(lost) => format!(

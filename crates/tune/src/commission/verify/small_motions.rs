@@ -87,11 +87,18 @@ const REST_S: f64 = 0.3;
 /// Number of moves out and back.
 const PAIRS: usize = 4;
 
+/// Largest velocity of a move over the velocity limit.
+const MOST_MOVE_VELOCITY: f64 = 0.9;
+
 /// The small slow motions that fit an axis.
 pub(super) fn small_motions(info: &AxisInfo) -> Vec<SmallMotion> {
+    let most_mm_s = MOST_MOVE_VELOCITY * info.max_velocity_mm_s;
     let fit = |motion: &SmallMotion| match *motion {
         SmallMotion::Sine(sine, cycles) => SmallMotion::Sine(fitted(sine, info), cycles),
-        moves @ SmallMotion::Moves(_) => moves,
+        SmallMotion::Moves(moves) => SmallMotion::Moves(Moves {
+            velocity_mm_s: moves.velocity_mm_s.min(most_mm_s),
+            ..moves
+        }),
     };
     SMALL_MOTIONS.iter().map(fit).collect()
 }
@@ -200,4 +207,35 @@ pub fn run_moves(
         progress((index + 1) as f64 / (2 * PAIRS) as f64);
     }
     Ok(largest_mm)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_small_motion_is_faster_than_the_axis() {
+        let info = |max_velocity_mm_s| AxisInfo {
+            name: "x",
+            rate_hz: 1e4,
+            resolution_mm: 1e-4,
+            full_scale_v: 10.0,
+            travel_mm: 30.0,
+            start_mm: 0.0,
+            max_velocity_mm_s,
+            max_acceleration_mm_s2: 2000.0,
+        };
+        for most_mm_s in [1.0, 6.0, 10.0, 17.7] {
+            for motion in small_motions(&info(most_mm_s)) {
+                assert!(motion.velocity_mm_s() < most_mm_s, "{motion}: {most_mm_s}");
+            }
+        }
+        for (asked, fitted) in SMALL_MOTIONS.iter().zip(small_motions(&info(200.0))) {
+            let as_asked = *asked == fitted;
+            assert!(
+                as_asked || matches!(asked, SmallMotion::Sine(..)),
+                "{fitted}"
+            );
+        }
+    }
 }

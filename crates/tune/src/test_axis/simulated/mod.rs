@@ -152,6 +152,13 @@ impl SimulatedTestAxis {
         self.farthest_mm = self.farthest_mm.max(position_mm.abs());
     }
 
+    /// Switches the outputs off: the law begins anew with the next experiment.
+    fn forget(&mut self) {
+        if self.kept.take().is_some() {
+            self.move_on(DacCode::ZERO, false);
+        }
+    }
+
     /// Lets the axis come to rest without its outputs, as after a fault.
     fn coast(&mut self) {
         let mut rested = 0;
@@ -416,16 +423,15 @@ impl TestAxis for SimulatedTestAxis {
         stage.axes[0] = settings.clone();
         stage.validate(ELEMENTS)?;
         if stage != self.stage {
-            self.switch_off();
+            self.forget();
         }
         self.stage = stage;
         Ok(())
     }
 
-    fn switch_off(&mut self) {
-        if self.kept.take().is_some() {
-            self.move_on(DacCode::ZERO, false);
-        }
+    fn switch_off(&mut self) -> Result<(), ExperimentError> {
+        self.forget();
+        Ok(())
     }
 
     fn perform(

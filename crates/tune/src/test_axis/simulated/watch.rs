@@ -1,4 +1,4 @@
-//! Limits that stop an experiment: travel, speed, time.
+//! Limits that stop an experiment: travel, time, and the speed of an open loop. In a closed one the law has its own limit.
 
 use crate::test_axis::{AxisInfo, Drive, Experiment, ExperimentError, open_loop_mm};
 
@@ -45,7 +45,8 @@ impl<'a> Watch<'a> {
                 time_s,
             });
         }
-        if ticks.is_multiple_of(SPEED_TICKS) {
+        let is_open = matches!(self.experiment.drive, Drive::OpenLoop);
+        if is_open && ticks.is_multiple_of(SPEED_TICKS) {
             let last_mm = self.watched_mm.replace(position_mm).unwrap_or(position_mm);
             let velocity_mm_s = (position_mm - last_mm) * self.axis.rate_hz / SPEED_TICKS as f64;
             if velocity_mm_s.abs() > self.axis.max_velocity_mm_s {
