@@ -272,6 +272,39 @@ fn refuse_restart(
     Ok(())
 }
 
+/// Settings of an axis, behind its name, that a commissioning changes while it measures.
+const MEASURED_UNDER: [&str; 10] = [
+    "commissioned",
+    "feedback/",
+    "feedforward/",
+    "friction/",
+    "plant",
+    "amplifier/output_limit_v",
+    "limits/max_velocity_mm_s",
+    "limits/unhomed_mm_s",
+    "limits/following_error_mm",
+    "limits/following_error_max_mm",
+];
+
+/// Refuses to go on with an axis that has other settings than before the first session where no measuring changes them.
+fn refuse_changed(before: &StageSettings, now: AxisSettings, axis: AxisName) -> anyhow::Result<()> {
+    let mut machine = before.clone();
+    machine.axes[axis as usize] = now;
+    let own = format!("{axis}/");
+    let differing = changes(before, &machine).into_iter().find(|change| {
+        let name = change.path.strip_prefix(&own).unwrap_or(&change.path);
+        !MEASURED_UNDER
+            .iter()
+            .any(|measured| name.starts_with(measured))
+    });
+    if let Some(Change { path, old, new }) = differing {
+        bail!(
+            "the machine has {path} = {new}, and had {old} when the commissioning was begun: give it back, or leave out --resume to begin again"
+        );
+    }
+    Ok(())
+}
+
 /// Checks that a folder holds experiments of the commissioning that `words` are of, and says what is adopted from there.
 fn resumed(experiments: &Path, words: &str) -> anyhow::Result<(String, Begun)> {
     let folder = experiments.display();
@@ -349,8 +382,9 @@ impl Job<'_> {
         let kept = experiments.join(Journal::BEFORE);
         if self.request.resume && kept.exists() {
             // Where the host has died, a law that was tried may be in force.
-            let first = SettingsFile::read(&kept)?.stage;
-            before.axes[axis as usize] = first.axes[axis as usize].clone();
+            let first = SettingsFile::read(&kept)?.stage.axes[axis as usize].clone();
+            let now = std::mem::replace(&mut before.axes[axis as usize], first);
+            refuse_changed(&before, now, axis)?;
         }
         let mut file = match self.start {
             Some(file) => {
@@ -1039,6 +1073,14 @@ mod tests {
         let again = said(commission_with(folder.path(), &mut machine, &["--resume"]));
         assert!(again.contains("the line is cut"), "{again}");
         assert_eq!(machine.settings().unwrap(), before);
+        // What a person has changed is not undone.
+        let mut turned = before.clone();
+        turned.axes[0].amplifier.reversed = true;
+        machine.load(&turned).unwrap();
+        let other = said(commission_with(folder.path(), &mut machine, &["--resume"]));
+        assert!(other.contains("x/amplifier/reversed = true"), "{other}");
+        assert_eq!(machine.settings().unwrap(), turned);
+        machine.load(&before).unwrap();
         machine.cut_at = None;
         let kept = Journal::count(&folder.path().join("x").join(EXPERIMENTS));
         for options in [

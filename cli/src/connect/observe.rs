@@ -58,12 +58,17 @@ pub(super) fn record(
         .unwrap_or_else(|| least_decimation(options.channels.len(), rate_hz));
     let mut recording = TelemetryRecorder::start(client, &options.channels, every)?;
     let began = client.now();
-    if !then(session) && !session.client.is_interrupted() {
+    let ran = then(session);
+    if !ran && !session.client.is_interrupted() {
         recording.finish(&mut session.client)?;
         bail!("record: nothing was written");
     }
     let client = &mut session.client;
-    let ended = until_rest(&mut recording, client, due.map(|due| (began, due)));
+    let ended = if ran {
+        until_rest(&mut recording, client, due.map(|due| (began, due)))
+    } else {
+        recording.gather(client, TAIL)
+    };
     // What has come is kept, whatever ended it.
     let so_far = recording.samples().clone();
     let (mut samples, ended) = match recording.finish(client) {
@@ -287,8 +292,8 @@ mod tests {
     use super::*;
     use crate::connect::printer::Printer;
 
-    #[test]
-    fn a_recording_that_is_interrupted_is_written_up_to_there() {
+    /// The samples and the answer of a recording of half a minute during which `then` runs.
+    fn recorded(then: impl FnOnce(&mut Session) -> bool) -> (usize, anyhow::Result<Answer>) {
         let folder = tempfile::tempdir().unwrap();
         let link = SimulatedLink::start(&StageSetup::commissioned(), 1, None).unwrap();
         let client = Client::open(link).unwrap();
@@ -302,21 +307,31 @@ mod tests {
             allow_gaps: false,
             then: Vec::new(),
         };
+        let answer = record(&mut session, &options, then);
+        let text = std::fs::read_to_string(&options.out).unwrap();
+        (text.lines().count(), answer)
+    }
+
+    #[test]
+    fn a_recording_that_is_interrupted_is_written_up_to_there() {
         let then = |session: &mut Session| {
             session.client.wait(Duration::from_secs(2)).unwrap();
             session.client.interrupt().request();
             true
         };
-        let error = record(&mut session, &options, then).err().unwrap();
-        let said = quadrant_cli::explained(&error);
+        let (rows, answer) = recorded(then);
+        let said = quadrant_cli::explained(&answer.err().unwrap());
         assert!(
             said.contains("run.csv") && said.contains("interrupted"),
             "{said}"
         );
-        let rows = std::fs::read_to_string(&options.out)
-            .unwrap()
-            .lines()
-            .count();
-        assert!(rows > 100, "{rows}");
+        // The command after it may be what is interrupted.
+        let (same, answer) = recorded(|session| {
+            then(session);
+            session.client.wait(Duration::from_secs(1)).is_ok()
+        });
+        assert!(answer.is_ok());
+        let (all, _) = recorded(|_| true);
+        assert!(rows > 100 && same < all / 5, "{rows} {same} {all}");
     }
 }

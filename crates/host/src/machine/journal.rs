@@ -405,7 +405,13 @@ fn keep(path: &Path, entry: &Entry) -> io::Result<()> {
 
 impl TestAxis for Journal<'_> {
     fn info(&self) -> AxisInfo {
-        let info = self.axis.info();
+        // The limits of settings that are not in force yet, too.
+        let limits = &self.settings.limits;
+        let info = AxisInfo {
+            max_velocity_mm_s: limits.max_velocity_mm_s,
+            max_acceleration_mm_s2: limits.max_acceleration_mm_s2,
+            ..self.axis.info()
+        };
         match self.travel {
             // To the last bit as it was: experiments are found again by their numbers.
             Some(travel) => AxisInfo {

@@ -21,7 +21,7 @@ use crate::identify::static_friction::{
 };
 use crate::identify::virgin_curve::{self, GmsFit, VirginCurveError, VirginCurveSettings};
 use crate::record::Recording;
-use crate::test_axis::{ExperimentError, MachineError, TestAxis, approach};
+use crate::test_axis::{ExperimentError, TestAxis, approach};
 
 /// The steps, for progress: name and share of the whole.
 const STEPS: [(&str, f64); 6] = [
@@ -240,12 +240,15 @@ fn guarded(
 
 /// Softens the PID until it does not hum at rest after a knock, if that takes little: errors grow faster than the crossover falls. Else it
 /// stays as it is. What is left of its hum.
+///
+/// # Errors
+/// Settings that the machine refuses, and an interruption.
 fn soften_at_rest(
     test_axis: &mut dyn TestAxis,
     knock: &Knock,
     found: &mut Commissioned,
     rate_hz: f64,
-) -> Result<Option<Ringing>, MachineError> {
+) -> Result<Option<Ringing>, CommissionError> {
     let mut softer = found.clone();
     let mut first = None;
     for _ in 0..=MAX_SOFTENINGS_AT_REST {

@@ -6,8 +6,10 @@
 use quadrant_law::reference::MotionSettings;
 use quadrant_settings::AxisSettings;
 
+use super::error::CommissionError;
 use super::linear_model::HOME_MM;
 use super::ringing::{Ringing, detrended, ringing};
+use super::verify::VerifyError;
 use crate::test_axis::{Drive, Experiment, ExperimentError, MachineError, TestAxis, approach};
 
 /// Time for which the axis is left alone after a knock, s.
@@ -57,14 +59,17 @@ impl Knock {
     /// one that comes to rest, or cannot be tested.
     ///
     /// # Errors
-    /// Settings that the machine refuses.
+    /// Settings that the machine refuses, and an interruption.
     pub(super) fn ringing(
         self,
         test_axis: &mut dyn TestAxis,
         settings: &AxisSettings,
-    ) -> Result<Option<(Ringing, bool)>, MachineError> {
+    ) -> Result<Option<(Ringing, bool)>, CommissionError> {
         let count_mm = test_axis.info().resolution_mm;
         Ok(match self.test(test_axis, settings)? {
+            Err(error @ ExperimentError::Interrupted { .. }) => {
+                return Err(VerifyError::from(error).into());
+            }
             Ok(rest) => rest.hum.map(|hum| {
                 let is_loud = rest.rms_mm > LOUD_COUNTS * count_mm;
                 (hum, is_loud && hum.frequency_hz >= SLOWEST_HUM_HZ)

@@ -48,6 +48,8 @@ const ENABLING: Duration = Duration::from_millis(100);
 /// Counts by which an axis that stands seems to move from one look to the next, and way that is as little, mm: noise, or creeping.
 const STILL_COUNTS: f64 = 2.5;
 const STILL_MM: f64 = 0.02;
+/// The same of another axis, mm: the law refuses to switch on while one is faster, and an input without an encoder may count a little.
+const OTHERS_STILL_MM: f64 = 0.25;
 
 /// An axis of a connected machine.
 ///
@@ -66,7 +68,7 @@ pub struct ConnectedAxis<'a> {
     /// The recording of the last experiment, if that was stopped.
     interrupted: Option<Recording>,
     /// The error after which nothing is ordered any more: a person has to see to the machine first.
-    ended: Option<ExperimentError>,
+    ended: Option<String>,
 }
 
 impl<'a> ConnectedAxis<'a> {
@@ -92,7 +94,7 @@ impl<'a> ConnectedAxis<'a> {
             stage,
             travel,
             origin_mm,
-            may_be_off: true,
+            may_be_off: !status.state.drives(),
             interrupted: None,
             ended: None,
         })
@@ -257,15 +259,16 @@ impl<'a> ConnectedAxis<'a> {
         loop {
             self.client.wait(LOOK)?;
             let axes = self.client.status()?.axes;
-            let stage = &self.stage.axes;
-            let moves = before
-                .iter()
-                .zip(&axes)
-                .zip(stage)
-                .any(|((before, now), axis)| {
-                    let still_mm = STILL_MM.max(STILL_COUNTS * axis.encoder.resolution_mm);
-                    (now.position_mm - before.position_mm).abs() > still_mm
-                });
+            let own_mm = STILL_MM.max(STILL_COUNTS * self.settings().encoder.resolution_mm);
+            let moves = AxisName::ALL.into_iter().any(|axis| {
+                let still_mm = if axis == self.axis {
+                    own_mm
+                } else {
+                    OTHERS_STILL_MM
+                };
+                let place = axis as usize;
+                (axes[place].position_mm - before[place].position_mm).abs() > still_mm
+            });
             if !moves {
                 return Ok(());
             }
@@ -288,17 +291,32 @@ impl<'a> ConnectedAxis<'a> {
         }
     }
 
-    /// Waits for the end of the motion, switches the outputs off, and waits for standstill. What ended the motion otherwise is said once
-    /// they are off.
+    /// Waits for the end of the motion, switches the outputs off, and waits for standstill. Where that fails, no other experiment follows.
     fn disable(&mut self) -> Result<(), ClientError> {
+        let off = self.switched_off();
+        if let Err(error) = &off {
+            self.ended.get_or_insert_with(|| error.to_string());
+        }
+        off
+    }
+
+    /// Switches the outputs off, if this session has them on. What ended the motion otherwise is said once they are off.
+    fn switched_off(&mut self) -> Result<(), ClientError> {
+        if self.may_be_off {
+            return Ok(());
+        }
         let rested = settle::rest(self.client, BEFORE);
+        if matches!(rested, Err(ClientError::Fault { .. })) {
+            // The axes may brake still.
+            let _ = settle::rest(self.client, BEFORE);
+        }
         if !self.client.status()?.state.drives() {
             return Ok(());
         }
         self.client.order(Body::Disable)?;
         self.may_be_off = true;
         // They stay on until a brake holds.
-        let patience = Duration::from_secs_f64(self.stage.brake.apply_s) + ENABLING;
+        let patience = Duration::from_secs_f64(self.stage.brake.apply_s) + COASTING;
         let due = self.client.now() + patience;
         while self.client.status()?.state.drives() {
             if self.client.now() >= due {
@@ -368,8 +386,7 @@ impl TestAxis for ConnectedAxis<'_> {
 
     fn switch_off(&mut self) -> Result<(), ExperimentError> {
         self.disable().map_err(|error| {
-            let error = Stop::from(error).into_error("switching the outputs off", self.axis, 0.0);
-            self.ended.get_or_insert(error).clone()
+            Stop::from(error).into_error("switching the outputs off", self.axis, 0.0)
         })
     }
 
@@ -379,13 +396,19 @@ impl TestAxis for ConnectedAxis<'_> {
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, ExperimentError> {
         self.interrupted = None;
-        if let Some(error) = &self.ended {
-            return Err(error.clone());
+        if let Some(done) = &self.ended {
+            return Err(ExperimentError::Interrupted {
+                experiment: experiment.name.clone(),
+                done: done.clone(),
+            });
         }
         self.run(experiment, progress).map_err(|stop| {
             let error = stop.into_error(&experiment.name, self.axis, experiment.time_limit_s);
             if !self.goes_on_after(&error) {
-                self.ended = Some(error.clone());
+                self.ended = Some(match &error {
+                    ExperimentError::Interrupted { done, .. } => done.clone(),
+                    other => other.to_string(),
+                });
             }
             error
         })

@@ -2,7 +2,7 @@
 
 use quadrant_law::axes::AxisName;
 use quadrant_law::safety::{Fault, FaultCode};
-use quadrant_link::message::InjectStatus;
+use quadrant_link::message::{InjectStatus, LinkError};
 use quadrant_tune::test_axis::ExperimentError;
 
 use crate::client::error::ClientError;
@@ -36,6 +36,10 @@ impl Stop {
     /// A failure before the outputs were on: a machine that refuses them, or moves without them, has a reason that a person is to see to.
     pub(super) fn not_enabled(error: ClientError) -> Self {
         match error {
+            ClientError::Refused {
+                source: LinkError::Busy(_),
+                ..
+            } => error.into(),
             ClientError::Refused { .. } | ClientError::TimedOut { .. } => {
                 Self::NotEnabled(Box::new(error))
             }
