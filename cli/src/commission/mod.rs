@@ -379,10 +379,10 @@ impl Job<'_> {
         folder.ready()?;
         let experiments = folder.file(EXPERIMENTS)?;
         let mut before = machine.settings()?;
-        let kept = experiments.join(Journal::BEFORE);
-        if self.request.resume && kept.exists() {
+        let settings_before = experiments.join(Journal::BEFORE);
+        if self.request.resume && settings_before.exists() {
             // Where the host has died, a law that was tried may be in force.
-            let first = SettingsFile::read(&kept)?.stage.axes[axis as usize].clone();
+            let first = SettingsFile::read(&settings_before)?.stage.axes[axis as usize].clone();
             let now = std::mem::replace(&mut before.axes[axis as usize], first);
             refuse_changed(&before, now, axis)?;
         }
@@ -425,7 +425,7 @@ impl Job<'_> {
             journal
                 .begin(&begun)
                 .with_context(|| format!("cannot write into {}", experiments.display()))?;
-            SettingsFile::new(before.clone()).write(&kept, whole::write)?;
+            SettingsFile::new(before.clone()).write(&settings_before, whole::write)?;
             for path in journal.foreign() {
                 warn!("{} was not written here, and stays", path.display());
             }
@@ -1018,7 +1018,7 @@ mod tests {
 
     #[test]
     fn an_interruption_among_the_trials_is_no_verdict_and_keeps_the_experiments() {
-        for at in ["PID on", "N-PID on", "N-PID + static on"] {
+        for at in ["knock at rest", "PID on", "N-PID on", "N-PID + static on"] {
             let folder = tempfile::tempdir().unwrap();
             let mut machine = Spoilt {
                 interrupted_at: Some(at),

@@ -70,11 +70,8 @@ pub(super) fn record(
         recording.gather(client, TAIL)
     };
     // What has come is kept, whatever ended it.
-    let so_far = recording.samples().clone();
-    let (mut samples, ended) = match recording.finish(client) {
-        Ok(samples) => (samples, ended),
-        Err(error) => (so_far, ended.and(Err(error))),
-    };
+    let ended = ended.and(recording.stop(client));
+    let mut samples = recording.into_samples();
     if let Some(due) = due {
         samples.truncate((due.as_secs_f64() / samples.sample_time_s).round() as usize);
     }

@@ -211,12 +211,26 @@ impl TelemetryRecorder {
     /// # Errors
     /// A connection that is broken.
     pub fn finish(mut self, client: &mut Client) -> Result<Samples, ClientError> {
+        self.stop(client)?;
+        Ok(self.samples)
+    }
+
+    /// Ends the selection; the samples that have come stay, also after an error.
+    ///
+    /// # Errors
+    /// A connection that is broken.
+    pub fn stop(&mut self, client: &mut Client) -> Result<(), ClientError> {
         client.request(Body::Telemetry(TelemetryRequest::Stop))?;
         // What was sent before the answer.
         for block in client.take_blocks() {
             self.take(&block);
         }
-        Ok(self.samples)
+        Ok(())
+    }
+
+    /// The samples that have come.
+    pub fn into_samples(self) -> Samples {
+        self.samples
     }
 
     fn take(&mut self, block: &TelemetryBlock) {

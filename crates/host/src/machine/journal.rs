@@ -1,6 +1,5 @@
 //! A journal of experiments: each is kept when it has ended, so that a series that was interrupted goes on where it stood.
 
-use std::ffi::OsStr;
 use std::fs::{self, FileType};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
@@ -195,7 +194,7 @@ impl Stopped {
 }
 
 impl<'a> Journal<'a> {
-    /// Name of a file in the folder with the settings that the machine had before: whoever begins a series may keep them there.
+    /// Name of a file in the folder for the settings that the machine had before, which the caller may keep there.
     pub const BEFORE: &'static str = "before.toml";
 
     /// A journal in a folder, which is made. Without `resume`, the experiments there are deleted, and [nothing
@@ -380,9 +379,9 @@ fn is_named(path: &Path) -> bool {
 /// It has the name of an experiment, and is none: a journal would write over it.
 fn is_own(path: &Path, kind: FileType) -> io::Result<bool> {
     if !is_named(path) {
-        let is_own = |name: &OsStr| name == REQUEST || name == Journal::BEFORE;
-        let is_named = path.file_name().is_some_and(is_own);
-        return Ok(kind.is_file() && (is_named || whole::is_unfinished(path)));
+        let mut others = [REQUEST, Journal::BEFORE].into_iter();
+        let is_other = others.any(|name| path.ends_with(name));
+        return Ok(kind.is_file() && (is_other || whole::is_unfinished(path)));
     }
     let is_entry = kind.is_file() && serde_json::from_slice::<Entry>(&fs::read(path)?).is_ok();
     match is_entry {

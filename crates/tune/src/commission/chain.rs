@@ -76,7 +76,7 @@ pub fn commission(
             };
             Err(match guard.switch_off() {
                 Ok(()) => error,
-                Err(reason) => CommissionError::StaysOn {
+                Err(reason) => CommissionError::SwitchingOff {
                     source: Box::new(error),
                     reason,
                 },

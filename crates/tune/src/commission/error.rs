@@ -78,10 +78,10 @@ pub enum CommissionError {
     },
     /// The outputs could not be switched off after another error, or a fault was found as they were.
     #[error("{source}; then, {reason}")]
-    StaysOn {
-        /// What ended it.
+    SwitchingOff {
+        /// The other error.
         source: Box<CommissionError>,
-        /// What was found.
+        /// The reason or the fault.
         reason: ExperimentError,
     },
     /// The sine could not be run.
@@ -104,7 +104,7 @@ impl CommissionError {
             | Self::Friction(StaticFrictionError::Experiment(error))
             | Self::Revise(ReviseError::Experiment(error))
             | Self::Verify(VerifyError::TestAxis(error)) => Some(error),
-            Self::Rings { source, .. } | Self::StaysOn { source, .. } => source.experiment(),
+            Self::Rings { source, .. } | Self::SwitchingOff { source, .. } => source.experiment(),
             _ => None,
         }
     }

@@ -222,7 +222,7 @@ impl<'a> ConnectedAxis<'a> {
             }
             if elapsed.as_secs_f64() > experiment.time_limit_s {
                 self.client.order(Body::Stop)?;
-                return Err(Stop::TimedOut);
+                return Err(Stop::TimedOut(experiment.time_limit_s));
             }
         }
         let tail = TAIL.max(Duration::from_secs_f64(TAIL_TICKS / rate_hz));
@@ -385,9 +385,8 @@ impl TestAxis for ConnectedAxis<'_> {
     }
 
     fn switch_off(&mut self) -> Result<(), ExperimentError> {
-        self.disable().map_err(|error| {
-            Stop::from(error).into_error("switching the outputs off", self.axis, 0.0)
-        })
+        self.disable()
+            .map_err(|error| Stop::from(error).into_error("switching the outputs off", self.axis))
     }
 
     fn perform(
@@ -403,7 +402,7 @@ impl TestAxis for ConnectedAxis<'_> {
             });
         }
         self.run(experiment, progress).map_err(|stop| {
-            let error = stop.into_error(&experiment.name, self.axis, experiment.time_limit_s);
+            let error = stop.into_error(&experiment.name, self.axis);
             if !self.goes_on_after(&error) {
                 self.ended = Some(match &error {
                     ExperimentError::Interrupted { done, .. } => done.clone(),

@@ -19,7 +19,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Pause before a full queue is asked again.
 const PAUSE: Duration = Duration::from_millis(2);
 /// Looks after which an injection that all values were sent of must have ended, and a stop.
-const LOOKS: usize = 200;
+const LOOKS: u32 = 200;
 
 /// A voltage on its way.
 pub(super) struct Injection {
@@ -116,7 +116,7 @@ impl Injection {
                 _ => Err(broken(client, status)?),
             };
         }
-        Err(Stop::TimedOut)
+        Err(Stop::TimedOut(f64::from(LOOKS) * PAUSE.as_secs_f64()))
     }
 }
 

@@ -18,7 +18,8 @@ pub(super) enum Stop {
     Client(Box<ClientError>),
     /// The machine keeps its outputs off.
     NotEnabled(Box<ClientError>),
-    TimedOut,
+    /// The motion has not ended within a time, s.
+    TimedOut(f64),
     Lost(u64),
     /// The injection was broken off.
     Broken(InjectStatus),
@@ -47,20 +48,15 @@ impl Stop {
         }
     }
 
-    /// The end of an experiment of this name on `axis`, that may take so long, s.
-    pub(super) fn into_error(
-        self,
-        name: &str,
-        axis: AxisName,
-        time_limit_s: f64,
-    ) -> ExperimentError {
+    /// The end of an experiment of this name on `axis`.
+    pub(super) fn into_error(self, name: &str, axis: AxisName) -> ExperimentError {
         let name = name.to_owned();
         let interrupted = |done: String| ExperimentError::Interrupted {
             experiment: name.clone(),
             done,
         };
         let reason = match self {
-            Self::TimedOut => {
+            Self::TimedOut(time_limit_s) => {
                 return ExperimentError::TimedOut {
                     experiment: name,
                     time_limit_s,

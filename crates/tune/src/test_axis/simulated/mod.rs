@@ -152,7 +152,7 @@ impl SimulatedTestAxis {
         self.farthest_mm = self.farthest_mm.max(position_mm.abs());
     }
 
-    /// Switches the outputs off: the law begins anew with the next experiment.
+    /// Switches the outputs off: the next experiment gets a new law.
     fn forget(&mut self) {
         if self.kept.take().is_some() {
             self.move_on(DacCode::ZERO, false);
