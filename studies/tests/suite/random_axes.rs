@@ -58,6 +58,17 @@ fn feedforward_that_throws_a_short_quick_move_is_left_out_on_strokes_as_short() 
     assert!(line.mean_ratio.unwrap() < 0.4, "{line:?}");
 }
 
+/// The nonlinear gain and what is fed forward are too much on moves of 2 mm at 3 mm/s for the first one, on a sine of 2 mm at 1.2 mm/s for the other.
+#[test]
+fn a_law_that_is_worse_on_slow_motions_of_millimetres_is_the_pid_there() {
+    [26_580, 26_452].into_par_iter().for_each(|seed| {
+        let line = judge(seed, Judging::Usual);
+        println!("{line:?}");
+        assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
+        assert!(line.mean_ratio.unwrap() < 0.85, "{line:?}");
+    });
+}
+
 #[test]
 fn the_cheapest_of_the_named_axes_are_commissioned() {
     let names = ["travel of 10 mm either way", "travel of -3 to 37 mm"];
@@ -137,6 +148,14 @@ fn axes_whose_pid_oscillates_while_friction_holds_them_get_a_softer_one_and_are_
         assert!(line.worst_ratio.unwrap() < 1.03, "{line:?}");
         assert!(line.mean_ratio.unwrap() < 0.3, "{line:?}");
     });
+}
+
+/// On +-6 mm behind a spring of 89 Hz: let go up to 1.2 times its velocity limit, it swings too far for every further controller.
+#[test]
+fn an_axis_that_swings_under_the_first_controllers_is_stopped_early_and_commissioned() {
+    let line = judge(26_057, Judging::Usual);
+    println!("{line:?}");
+    assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
 }
 
 /// An axis that kept the PID alone before other kinds were tried after the withheld sines had refused the best: Dahl's model ends in a

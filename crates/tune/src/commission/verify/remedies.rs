@@ -30,12 +30,13 @@ enum Remedy {
 }
 
 /// Remedies in the order in which they are tried: the first that is not worse than the PID on any sine is chosen.
-const REMEDIES: [Remedy; 5] = [
+const REMEDIES: [Remedy; 6] = [
     Remedy::From(0.4),
     Remedy::From(0.8),
     Remedy::Linear,
     Remedy::From(FROM_MM_S),
     Remedy::LinearFrom(FROM_MM_S),
+    Remedy::LinearFrom(FAST_MM_S[1]),
 ];
 
 /// Largest error over the PID's on a usual sine up to which a remedy is chosen where there is no better one: that of an axis that sticks

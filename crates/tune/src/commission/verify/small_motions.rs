@@ -44,7 +44,7 @@ const fn moves(distance_mm: f64, velocity_mm_s: f64) -> SmallMotion {
 /// The small slow motions. The frequency decides if a table behind a spring is thrown: most of the short sines are at 3 to 12 Hz, and many of their
 /// cycles count, for an axis that sticks does not do the same in each. The last ones are slow, or longer at a moderate speed: they show an axis that meets less
 /// friction at such a speed than is fed forward, or one that turns so slowly that the PID follows.
-const SMALL_MOTIONS: [SmallMotion; 26] = [
+const SMALL_MOTIONS: [SmallMotion; 28] = [
     sine(0.02, 0.6, Cycles::scoring(9)),
     sine(0.02, 0.9, Cycles::scoring(9)),
     sine(0.02, 1.2, Cycles::scoring(9)),
@@ -52,6 +52,8 @@ const SMALL_MOTIONS: [SmallMotion; 26] = [
     sine(0.03, 1.4, Cycles::scoring(9)),
     sine(0.05, 1.0, Cycles::scoring(9)),
     sine(0.05, 1.4, Cycles::scoring(9)),
+    sine(0.055, 0.75, Cycles::scoring(9)),
+    sine(0.06, 1.55, Cycles::scoring(9)),
     sine(0.02, 1.55, Cycles::scoring(9)),
     sine(0.08, 1.45, Cycles::scoring(9)),
     sine(0.15, 1.55, Cycles::scoring(5)),
@@ -64,16 +66,16 @@ const SMALL_MOTIONS: [SmallMotion; 26] = [
     moves(0.1, 18.0),
     sine(0.11, 3.2, Cycles::scoring(5)),
     sine(0.24, 6.0, Cycles::scoring(5)),
+    moves(1.8, 2.8),
     sine(0.1, 0.35, Cycles::of_slow(3)),
     sine(0.18, 0.2, Cycles::of_slow(1)),
     sine(0.7, 0.85, Cycles::of_slow(2)),
     sine(0.6, 0.45, Cycles::of_slow(1)),
-    sine(0.8, 1.1, Cycles::of_slow(2)),
-    sine(1.6, 1.4, Cycles::of_slow(1)),
+    sine(1.9, 1.25, Cycles::of_slow(2)),
     sine(0.9, 0.2, Cycles::of_slow(1)),
 ];
 /// Number of them, the short ones, after which the PID's scores on the others are needed: those take most of the time.
-pub(super) const SHORT_MOTIONS: usize = 19;
+pub(super) const SHORT_MOTIONS: usize = 21;
 /// Number of them, the first ones, on which a law has to keep its margin: there the table is thrown by what is fed forward beyond its friction.
 pub(super) const MARGIN_MOTIONS: usize = 7;
 /// Velocity of most of the sines at most, mm/s.
