@@ -24,10 +24,6 @@ const FILTER_RATIO: f64 = 0.03;
 /// Tracking error allowed while the axis is measured, mm: the first controller is soft.
 const FOLLOWING_ERROR_MM: f64 = 10.0;
 
-/// Speed at which an axis is stopped under a first controller, over its limit: the least, for one that swings is the harder to calm the
-/// faster it became.
-const FIRST_OVERSPEED_RATIO: f64 = 1.05;
-
 /// Crossovers that the first controller tries, over the usual one: the lower ones leave a structural mode alone.
 pub const BOOTSTRAP_SHARES: [f64; 4] = [1.0, 0.5, 0.25, MIN_BOOTSTRAP_SHARE];
 /// Lowest of these shares.
@@ -72,7 +68,6 @@ fn bootstrap_at(
     crossover_hz: f64,
 ) -> AxisSettings {
     let mut settings = measuring_settings(base);
-    settings.limits.overspeed_ratio = FIRST_OVERSPEED_RATIO;
     let crossover = TAU * crossover_hz;
     // |L| = A Kp sqrt(1 + lead^2) / w^2 = 1 on the double integrator that every axis is above its damping's corner.
     let kp_v_per_mm = crossover * crossover / (gain_mm_per_v_s2 * LEAD_RATIO.hypot(1.0));

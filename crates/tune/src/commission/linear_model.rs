@@ -105,12 +105,17 @@ fn first_controller(
     rate_hz: f64,
     share: f64,
 ) -> AxisSettings {
-    let settings = soft_bootstrap_settings(base, gain, rate_hz, share);
+    let mut settings = soft_bootstrap_settings(base, gain, rate_hz, share);
+    settings.limits.overspeed_ratio = FIRST_OVERSPEED_RATIO;
     let [ahead_v, back_v] = motor.directed_v;
     let excitation_v = FrfSettings::default().excitation.rms_v;
     let most_v = MAX_FRICTION_RATIO * ahead_v.max(back_v).max(excitation_v);
     with_output_limit(settings, most_v)
 }
+
+/// Speed at which an axis is stopped under a first controller, over its limit: the least, for one that swings is the harder to calm the
+/// faster it became.
+const FIRST_OVERSPEED_RATIO: f64 = 1.05;
 
 /// Largest voltage of a first controller over friction, or over the excitation where that is more: on random axes those that held took 0.9 to 4.
 const MAX_FRICTION_RATIO: f64 = 6.0;
