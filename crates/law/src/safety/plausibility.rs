@@ -6,7 +6,7 @@
 //!
 //! - **No motion.** While the encoder stands (or dithers between two counts, as with one dead line), the voltage may
 //!   change by what friction takes up before it yields visibly, or fall by what friction gives up as it eases under a vibration. What goes beyond moves a model, `v' = A u - B v`, from
-//!   rest; when that has gone farther than a distance, the encoder is dead or the axis is blocked. The change counts from
+//!   rest, and while nothing does, friction brakes it; when that has gone farther than a distance, the encoder is dead or the axis is blocked. The change counts from
 //!   the last motion that was seen, because a load may be held at rest with any voltage; and in the sense in which the axis
 //!   last slid, from the voltage at which it slid, beyond which friction takes up little more. In open loop nothing is held, so
 //!   there the voltage itself counts too, beyond what friction can hold.
@@ -582,11 +582,14 @@ impl Plausibility {
                 }
                 force = beyond(state.force, allowed);
             }
-            state.modelled = if self.modelled {
+            state.modelled = if !self.modelled {
+                force
+            } else if force == 0 {
+                // Friction, which takes it up, brakes the model, too: pulses within a count do not add up.
+                beyond(state.modelled, self.held)
+            } else {
                 let lost = part(state.modelled, self.drag);
                 state.modelled.saturating_add(force.saturating_sub(lost))
-            } else {
-                force
             };
         }
         // Kept through motion: an encoder with gaps shows some.

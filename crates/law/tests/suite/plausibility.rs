@@ -235,6 +235,43 @@ fn an_encoder_that_stands_is_found_when_the_model_has_gone_the_distance() {
     }
 }
 
+/// So pushes a PID whose derivative answers every count of a fast axis.
+#[test]
+fn short_pushes_of_an_axis_that_friction_stops_after_each_do_not_add_up() {
+    const EVERY_S: f64 = 0.01;
+    let model = model();
+    for words in AMPLIFIERS {
+        let axis = Plausibility::new(&model, words, COUNT_MM, PERIOD_S);
+        for (push_v, lasts_s) in [(9.0, 4e-4), (-9.0, 4e-4), (4.0, 8e-4), (-4.0, 3.6e-3)] {
+            let volts = |time_s: f64| {
+                let is_pushed = (time_s + 0.5 * PERIOD_S) % EVERY_S < lasts_s;
+                if is_pushed { push_v } else { 0.0 }
+            };
+            let (mut force, mut velocity, mut distance) = (0.0_f64, 0.0_f64, 0.0_f64);
+            let found = expected(|now_s| {
+                let ticks = (0..INTERVAL).map(|tick| volts(now_s - f64::from(tick) * PERIOD_S));
+                let mean_v = ticks.sum::<f64>() / f64::from(INTERVAL);
+                force += (mean_v - force) * INTERVAL_S / (model.delay_s + FILTER_S);
+                let beyond = (force.abs() - model.held_v).max(0.0) * force.signum();
+                if beyond == 0.0 {
+                    let braked = model.gain_mm_per_v_s2 * model.held_v * INTERVAL_S;
+                    velocity = (velocity.abs() - braked).max(0.0) * velocity.signum();
+                } else {
+                    velocity += (model.gain_mm_per_v_s2 * beyond - model.damping_per_s * velocity)
+                        * INTERVAL_S;
+                }
+                distance += velocity * INTERVAL_S - distance * INTERVAL_S / FORGET_S;
+                distance.abs() > model.distance_mm
+            });
+            let what = format!("{words:?}, {push_v} V for {lasts_s} s");
+            let stands = |_| (0.0, 0.0);
+            let seen = time_until_found(&axis, words, false, volts, stands);
+            near(&what, seen, found);
+            assert_eq!(seen.is_none(), lasts_s < 1e-3, "{what}");
+        }
+    }
+}
+
 #[test]
 fn a_force_that_falls_towards_zero_while_an_axis_stands_is_friction_that_eases() {
     const STOPS_S: f64 = 0.5;
