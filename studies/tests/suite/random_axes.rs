@@ -7,6 +7,13 @@ use quadrant_studies::random_axes::{
 use quadrant_tune::test_axis::Travel;
 use rayon::prelude::*;
 
+/// Judged to be no worse than its PID anywhere, and with less than this share of its error on the mean.
+fn assert_commissioned(line: &Line, most_of_pid: f64) {
+    println!("{line:?}");
+    assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
+    assert!(line.mean_ratio.unwrap() < most_of_pid, "{line:?}");
+}
+
 #[test]
 fn random_axes_are_commissioned_or_refused_within_their_travel_and_none_is_worse_than_its_pid() {
     let lines: Vec<_> = (1..=20)
@@ -43,9 +50,7 @@ fn random_axes_are_commissioned_or_refused_within_their_travel_and_none_is_worse
 fn feedforward_that_throws_a_small_slow_motion_is_not_chosen_and_less_of_it_is() {
     [12, 13].into_par_iter().for_each(|seed| {
         let line = judge(seed, Judging::SmallToo);
-        println!("{line:?}");
-        assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
-        assert!(line.mean_ratio.unwrap() < 0.3, "{line:?}");
+        assert_commissioned(&line, 0.3);
     });
 }
 
@@ -53,9 +58,7 @@ fn feedforward_that_throws_a_small_slow_motion_is_not_chosen_and_less_of_it_is()
 #[test]
 fn feedforward_that_throws_a_short_quick_move_is_left_out_on_strokes_as_short() {
     let line = judge(23_015, Judging::Usual);
-    println!("{line:?}");
-    assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
-    assert!(line.mean_ratio.unwrap() < 0.4, "{line:?}");
+    assert_commissioned(&line, 0.4);
 }
 
 /// The nonlinear gain and what is fed forward are too much on moves of 2 mm at 3 mm/s for the first one, on a sine of 2 mm at 1.2 mm/s for the other.
@@ -63,9 +66,7 @@ fn feedforward_that_throws_a_short_quick_move_is_left_out_on_strokes_as_short() 
 fn a_law_that_is_worse_on_slow_motions_of_millimetres_is_the_pid_there() {
     [26_580, 26_452].into_par_iter().for_each(|seed| {
         let line = judge(seed, Judging::Usual);
-        println!("{line:?}");
-        assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
-        assert!(line.mean_ratio.unwrap() < 0.85, "{line:?}");
+        assert_commissioned(&line, 0.85);
     });
 }
 
@@ -79,9 +80,7 @@ fn the_cheapest_of_the_named_axes_are_commissioned() {
     assert_eq!(cases.len(), names.len());
     cases.par_iter().for_each(|case| {
         let line = judge_subject(case, Path::Law);
-        println!("{line:?}");
-        assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
-        assert!(line.mean_ratio.unwrap() < 0.4, "{line:?}");
+        assert_commissioned(&line, 0.4);
     });
 }
 
@@ -163,8 +162,7 @@ fn an_axis_that_swings_under_the_first_controllers_is_stopped_early_and_commissi
 #[test]
 fn an_axis_on_which_the_best_law_is_refused_gets_the_next() {
     let line = judge(18780, Judging::Usual);
-    assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
-    assert!(line.mean_ratio.unwrap() < 0.6, "{line:?}");
+    assert_commissioned(&line, 0.6);
 }
 
 #[test]

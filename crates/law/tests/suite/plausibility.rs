@@ -115,6 +115,29 @@ fn expected(mut step: impl FnMut(f64) -> bool) -> Option<f64> {
         .find(|&time_s| step(time_s))
 }
 
+/// The model of an axis that stands.
+#[derive(Default)]
+struct Standing {
+    velocity_mm_s: f64,
+    distance_mm: f64,
+}
+
+impl Standing {
+    /// Goes on for an interval under the voltage that friction does not take up; true when it has gone the distance.
+    fn goes_too_far(&mut self, model: &PlausibilityModel, beyond_v: f64) -> bool {
+        let gain = model.gain_mm_per_v_s2;
+        if beyond_v == 0.0 {
+            let speed = self.velocity_mm_s.abs() - gain * model.held_v * INTERVAL_S;
+            self.velocity_mm_s = speed.max(0.0) * self.velocity_mm_s.signum();
+        } else {
+            self.velocity_mm_s +=
+                (gain * beyond_v - model.damping_per_s * self.velocity_mm_s) * INTERVAL_S;
+        }
+        self.distance_mm += (self.velocity_mm_s - self.distance_mm / FORGET_S) * INTERVAL_S;
+        self.distance_mm.abs() > model.distance_mm
+    }
+}
+
 fn near(what: &str, found: Option<f64>, expected: Option<f64>) {
     match (found, expected) {
         (Some(found), Some(expected)) => assert!(
@@ -210,7 +233,7 @@ fn an_encoder_that_stands_is_found_when_the_model_has_gone_the_distance() {
         let axis = Plausibility::new(&model, words, COUNT_MM, PERIOD_S);
         for open in [true, false] {
             for volts in [0.55, 0.7, 1.0, -1.5, 4.0] {
-                let (mut force, mut velocity, mut distance) = (0.0_f64, 0.0_f64, 0.0_f64);
+                let (mut force, mut standing) = (0.0_f64, Standing::default());
                 let found = expected(|_| {
                     force += (volts - force) * INTERVAL_S / (model.delay_s + FILTER_S);
                     let beyond = |limit: f64| (force.abs() - limit).max(0.0) * force.signum();
@@ -218,10 +241,7 @@ fn an_encoder_that_stands_is_found_when_the_model_has_gone_the_distance() {
                     if open && moves == 0.0 {
                         moves = beyond(model.breakaway_v);
                     }
-                    velocity += (model.gain_mm_per_v_s2 * moves - model.damping_per_s * velocity)
-                        * INTERVAL_S;
-                    distance += velocity * INTERVAL_S - distance * INTERVAL_S / FORGET_S;
-                    distance.abs() > model.distance_mm
+                    standing.goes_too_far(&model, moves)
                 });
                 let what = format!("{words:?}, {volts} V, open: {open}");
                 let stands = |_| (0.0, 0.0);
@@ -247,21 +267,13 @@ fn short_pushes_of_an_axis_that_friction_stops_after_each_do_not_add_up() {
                 let is_pushed = (time_s + 0.5 * PERIOD_S) % EVERY_S < lasts_s;
                 if is_pushed { push_v } else { 0.0 }
             };
-            let (mut force, mut velocity, mut distance) = (0.0_f64, 0.0_f64, 0.0_f64);
+            let (mut force, mut standing) = (0.0_f64, Standing::default());
             let found = expected(|now_s| {
                 let ticks = (0..INTERVAL).map(|tick| volts(now_s - f64::from(tick) * PERIOD_S));
                 let mean_v = ticks.sum::<f64>() / f64::from(INTERVAL);
                 force += (mean_v - force) * INTERVAL_S / (model.delay_s + FILTER_S);
                 let beyond = (force.abs() - model.held_v).max(0.0) * force.signum();
-                if beyond == 0.0 {
-                    let braked = model.gain_mm_per_v_s2 * model.held_v * INTERVAL_S;
-                    velocity = (velocity.abs() - braked).max(0.0) * velocity.signum();
-                } else {
-                    velocity += (model.gain_mm_per_v_s2 * beyond - model.damping_per_s * velocity)
-                        * INTERVAL_S;
-                }
-                distance += velocity * INTERVAL_S - distance * INTERVAL_S / FORGET_S;
-                distance.abs() > model.distance_mm
+                standing.goes_too_far(&model, beyond)
             });
             let what = format!("{words:?}, {push_v} V for {lasts_s} s");
             let stands = |_| (0.0, 0.0);
@@ -296,7 +308,7 @@ fn a_force_that_falls_towards_zero_while_an_axis_stands_is_friction_that_eases()
             };
             // One that a load holds moves on whatever its voltage is.
             let creeps = |time_s: f64| (2.0 * time_s.min(STOPS_S), 0.0);
-            let (mut force, mut velocity, mut distance) = (0.0_f64, 0.0_f64, 0.0_f64);
+            let (mut force, mut standing) = (0.0_f64, Standing::default());
             let found = expected(|now_s| {
                 force += (volts(now_s) - force) * INTERVAL_S / (model.delay_s + FILTER_S);
                 if now_s < STOPS_S {
@@ -309,11 +321,7 @@ fn a_force_that_falls_towards_zero_while_an_axis_stands_is_friction_that_eases()
                     (true, false) => 1.2 + model.regained_v,
                     (true, true) => 1.5 + model.regained_v,
                 };
-                velocity += (model.gain_mm_per_v_s2 * (fallen.abs() - taken).max(0.0)
-                    - model.damping_per_s * velocity)
-                    * INTERVAL_S;
-                distance += velocity * INTERVAL_S - distance * INTERVAL_S / FORGET_S;
-                distance > model.distance_mm
+                standing.goes_too_far(&model, (fallen.abs() - taken).max(0.0))
             });
             let seen = time_until_found(&axis, words, false, volts, creeps);
             let what = format!("{words:?}, {level_v} V, {eased_v} V, {falls_v_per_s} V/s");
