@@ -97,6 +97,30 @@ fn after_an_emergency_stop_between_experiments_no_other_one_moves_the_axis() {
 }
 
 #[test]
+fn an_axis_that_swings_evenly_ends_its_experiment_and_no_more() {
+    let mut client = open(&StageSetup::commissioned());
+    let mut axis = x(&mut client);
+    let stable = measuring_settings(axis.settings());
+    // A loop that is not damped: once pushed it swings by 0.3 mm either way, for more the output is too small.
+    let mut swings = stable.clone();
+    swings.plant = None;
+    swings.feedback.pid.kp_v_per_mm *= 10.0;
+    swings.feedback.pid.ki_v_per_mm_s = 0.0;
+    swings.feedback.pid.kd_v_s_per_mm = 0.0;
+    swings.amplifier.output_limit_v = 0.6;
+    swings.limits.following_error_mm = 0.4;
+    swings.limits.following_error_max_mm = 0.4;
+    axis.apply(&swings).unwrap();
+    let mut pushed = hold();
+    pushed.injection_v = vec![0.5; 100];
+    pushed.injection_v.extend(vec![0.0; 30_000]);
+    let swung = axis.perform(&pushed, &mut |_| {}).unwrap_err();
+    assert_eq!(swung.fault(), Some(FaultCode::Oscillation), "{swung}");
+    axis.apply(&stable).unwrap();
+    perform(&mut axis).unwrap();
+}
+
+#[test]
 fn a_fault_of_another_axis_stays_latched_and_ends_the_experiments() {
     let mut setup = StageSetup::commissioned();
     // A loop that is not stable.

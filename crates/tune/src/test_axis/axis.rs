@@ -236,9 +236,9 @@ pub enum ExperimentError {
         /// State of the axes since, or the machine's reason.
         done: String,
     },
-    /// The axis left its travel.
+    /// The axis left what it may use of its travel: less than half in open loop, where nothing brings it back.
     #[error(
-        "{experiment}: the axis left its travel of +-{travel_mm} mm after {time_s:.3} s; \
+        "{experiment}: after {time_s:.3} s the axis left what this may use of its travel of +-{travel_mm:.2} mm; \
          give it more travel, or a weaker or shorter excitation"
     )]
     Travel {

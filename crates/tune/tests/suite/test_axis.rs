@@ -132,11 +132,17 @@ fn decimation_averages_the_voltage_and_drops_an_incomplete_sample() {
 }
 
 #[test]
-fn an_axis_that_leaves_its_travel_is_stopped() {
+fn an_axis_in_open_loop_is_stopped_where_it_leaves_what_it_may_use_of_its_travel() {
     let mut test_axis = test_axis(1);
     let push = experiment(Drive::OpenLoop, vec![0.5; 100_000]);
     let error = perform(&mut test_axis, &push).unwrap_err();
-    assert!(matches!(error, ExperimentError::Travel { .. }), "{error}");
+    let said = error.to_string();
+    assert!(matches!(error, ExperimentError::Travel { .. }), "{said}");
+    assert!(said.contains("what this may use of its travel"), "{said}");
+    let stopped = test_axis.interrupted().unwrap();
+    let most = |most: f64, position_mm: &f64| most.max(position_mm.abs());
+    let most_mm = stopped.position_mm.iter().fold(0.0, most);
+    assert!(most_mm < 0.5 * test_axis.info().travel_mm, "{most_mm}");
 }
 
 #[test]

@@ -31,10 +31,11 @@ const TAIL_TICKS: f64 = 300.0;
 /// Time for a moving axis to come to rest before an experiment.
 const BEFORE: Duration = Duration::from_secs(60);
 /// Faults that end an experiment, and no more.
-const ENDS_EXPERIMENTS: [FaultCode; 3] = [
+const ENDS_EXPERIMENTS: [FaultCode; 4] = [
     FaultCode::FollowingError,
     FaultCode::Overspeed,
     FaultCode::InjectionBounds,
+    FaultCode::Oscillation,
 ];
 /// Time in which axes come to rest without their outputs.
 const COASTING: Duration = Duration::from_secs(5);
