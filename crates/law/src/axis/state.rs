@@ -165,6 +165,7 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
             words: self.telemetry.code_sum,
             reference: Shown::reference(self.telemetry.reference),
             open: self.mode() == MotionMode::OpenLoop,
+            excited: self.injected != S::ZERO,
         }
     }
 

@@ -6,7 +6,7 @@
 //!
 //! - **No motion.** While the encoder stands (or dithers between two counts, as with one dead line), the voltage may
 //!   change by what friction takes up before it yields visibly, or fall by what friction gives up as it eases under a vibration. What goes beyond moves a model, `v' = A u - B v`, from
-//!   rest, and while nothing does, friction brakes it; when that has gone farther than a distance, the encoder is dead or the axis is blocked. The change counts from
+//!   rest, and while nothing does, friction brakes it, except under an injected voltage, whose vibration releases what friction holds; when that has gone farther than a distance, the encoder is dead or the axis is blocked. The change counts from
 //!   the last motion that was seen, because a load may be held at rest with any voltage; and in the sense in which the axis
 //!   last slid, from the voltage at which it slid, beyond which friction takes up little more. In open loop nothing is held, so
 //!   there the voltage itself counts too, beyond what friction can hold.
@@ -209,6 +209,8 @@ pub struct Shown {
     pub reference: i32,
     /// The loop is open.
     pub open: bool,
+    /// A voltage is injected, in open loop or in closed loop.
+    pub excited: bool,
 }
 
 impl Shown {
@@ -396,11 +398,11 @@ impl Plausibility {
             let regained = if rests { self.regained } else { 0 };
             let follows = self.follows(state, counts, speed, shown);
             self.moves_along(state, counts, speed)
-                & self.stands(state, counts, shown.open, regained)
+                & self.stands(state, counts, shown, regained)
                 & follows
         } else {
             state.force = pushed;
-            !shown.open | self.stands(state, counts, shown.open, 0)
+            !shown.open | self.stands(state, counts, shown, 0)
         }
     }
 
@@ -562,7 +564,7 @@ impl Plausibility {
         &self,
         state: &mut PlausibilityState,
         counts: i32,
-        open: bool,
+        shown: Shown,
         regained: i32,
     ) -> bool {
         state.travelled = state.travelled.saturating_add(counts);
@@ -575,7 +577,7 @@ impl Plausibility {
             state.silent = state.silent.saturating_add(1);
             let held = self.beyond_held(state, regained);
             let mut force = larger(held, self.beyond_sliding(state));
-            if open && force == 0 {
+            if shown.open && force == 0 {
                 let mut allowed = self.breakaway;
                 if state.silent < self.alive_for {
                     allowed = allowed.max(state.anchor.saturating_mul(state.force.signum()));
@@ -584,7 +586,7 @@ impl Plausibility {
             }
             state.modelled = if !self.modelled {
                 force
-            } else if force == 0 {
+            } else if force == 0 && !shown.excited {
                 // Friction, which takes it up, brakes the model, too: pulses within a count do not add up.
                 beyond(state.modelled, self.held)
             } else {

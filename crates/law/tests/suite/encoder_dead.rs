@@ -42,6 +42,32 @@ enum Activity {
     OpenLoop(f64, f64),
     /// The same added to the law's output.
     ClosedLoop(f64, f64),
+    /// The axis hangs with a load, has gone upwards, and stands; a multisine is added to the law's output.
+    Shaken(Shaking),
+}
+
+/// A multisine at rest, as a commissioning's response at rest has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Shaking {
+    load_v: f64,
+    /// Its lowest frequency, Hz; the highest is 400 Hz.
+    lowest_hz: f64,
+    rms_v: f64,
+}
+
+impl Shaking {
+    /// The voltage of a word of this number, V: sines every 2 Hz, with phases that are no series of peaks (Schroeder).
+    fn volts(self, word: u32) -> f64 {
+        const STEP_HZ: f64 = 2.0;
+        let (first, last) = ((self.lowest_hz / STEP_HZ) as u32, 200);
+        let count = f64::from(last - first + 1);
+        let time = f64::from(word) * PERIOD_S;
+        let sines = (first..=last).zip(1_u32..).map(|(line, number)| {
+            let phase = core::f64::consts::PI * f64::from(number).powi(2) / count;
+            (core::f64::consts::TAU * STEP_HZ * f64::from(line) * time + phase).sin()
+        });
+        self.rms_v * (2.0 / count).sqrt() * sines.sum::<f64>()
+    }
 }
 
 const ACTIVITIES: [Activity; 22] = [
@@ -149,7 +175,7 @@ impl<S: Scalar> Bench<S> {
         match self.activity {
             Activity::Rest | Activity::RestUnderLoad => None,
             Activity::Jog(velocity) | Activity::JogFromRest(velocity) => Some(jog(velocity)),
-            Activity::Lowering(..) => Some(jog(RAISING_MM_S)),
+            Activity::Lowering(..) | Activity::Shaken(_) => Some(jog(RAISING_MM_S)),
             Activity::Sine(_) | Activity::CutSine(..) | Activity::Move => Some(Command::Run),
             Activity::Homing => Some(Command::Home(AxisName::X)),
             Activity::Stream => {
@@ -165,22 +191,25 @@ impl<S: Scalar> Bench<S> {
                 self.feed();
                 Some(Command::StartStream)
             }
-            Activity::OpenLoop(..) | Activity::ClosedLoop(..) => {
-                let request = InjectionSettings {
-                    axis: AxisName::X,
-                    open_loop: matches!(self.activity, Activity::OpenLoop(..)),
-                    with_plan: false,
-                    limit_v: 10.0,
-                    travel_mm: 100.0,
-                    max_velocity_mm_s: 250.0,
-                };
-                let (injection, _): (Injection<S>, u16) =
-                    StageSettings::simulated().injection(&request).unwrap();
-                self.rig.state.prepare_injection(injection);
-                self.feed();
-                Some(Command::StartInjection)
-            }
+            Activity::OpenLoop(..) => Some(self.begin_injection(true)),
+            Activity::ClosedLoop(..) => Some(self.begin_injection(false)),
         }
+    }
+
+    fn begin_injection(&mut self, open_loop: bool) -> Command {
+        let request = InjectionSettings {
+            axis: AxisName::X,
+            open_loop,
+            with_plan: false,
+            limit_v: 10.0,
+            travel_mm: 100.0,
+            max_velocity_mm_s: 250.0,
+        };
+        let (injection, _): (Injection<S>, u16) =
+            StageSettings::simulated().injection(&request).unwrap();
+        self.rig.state.prepare_injection(injection);
+        self.feed();
+        Command::StartInjection
     }
 
     /// Serves streams and injections.
@@ -229,14 +258,20 @@ impl<S: Scalar> Bench<S> {
                 }
             }
         }
-        if let Activity::OpenLoop(volts, hz) | Activity::ClosedLoop(volts, hz) = self.activity
+        let volts = match self.activity {
+            Activity::OpenLoop(volts, hz) | Activity::ClosedLoop(volts, hz) => {
+                let turn = core::f64::consts::TAU * hz * f64::from(self.words) * PERIOD_S;
+                // Without a frequency, a constant voltage.
+                Some(volts * if hz > 0.0 { turn.sin() } else { 1.0 })
+            }
+            Activity::Shaken(shaking) => Some(shaking.volts(self.words)),
+            _ => None,
+        };
+        if let Some(volts) = volts
             && self.rig.state.wants_voltage()
         {
-            let turn = core::f64::consts::TAU * hz * f64::from(self.words) * PERIOD_S;
             self.words += 1;
-            // Without a frequency, a constant voltage.
-            let wave = if hz > 0.0 { turn.sin() } else { 1.0 };
-            let word = DacCode::from_volts(volts * wave, 10.0);
+            let word = DacCode::from_volts(volts, 10.0);
             self.rig.state.push_injection(InjectedValue {
                 word: word.0,
                 last: false,
@@ -262,6 +297,14 @@ impl<S: Scalar> Bench<S> {
             match self.ticks {
                 RAISED => self.rig.inputs.command = Some(jog(0.0)),
                 LOWERED => self.rig.inputs.command = Some(jog(-velocity)),
+                _ => {}
+            }
+        }
+        if let Activity::Shaken(shaking) = self.activity {
+            self.plant.load_v = -shaking.load_v;
+            match self.ticks {
+                RAISED => self.rig.inputs.command = Some(jog(0.0)),
+                LOWERED => self.rig.inputs.command = Some(self.begin_injection(false)),
                 _ => {}
             }
         }
@@ -311,6 +354,7 @@ fn run_until_off(settings: &StageSettings, truth: &Truth, activity: Activity, de
         Activity::Jog(velocity) if velocity > 100.0 => 3000,
         Activity::Homing => 1000,
         Activity::Move => 2500,
+        Activity::Shaken(_) => LOWERED + 10_000,
         _ => 6500,
     };
     let mut dead = Bench::<f32>::new(settings, truth, activity, death, at);
@@ -387,6 +431,32 @@ fn is_unseen(activity: Activity, death: Death) -> bool {
 #[test]
 fn an_encoder_that_dies_switches_off_before_the_axis_has_gone_far() {
     every_death(&StageSettings::simulated(), &ACTIVITIES);
+}
+
+#[test]
+fn an_encoder_that_dies_while_the_axis_is_shaken_at_rest_is_found() {
+    for (load_v, friction, lowest_hz, rms_v, most_mm) in [
+        (0.0, 1.0, 25.0, 0.17, 1.0),
+        (0.0, 0.67, 25.0, 0.17, 1.2),
+        (0.0, 1.0, 25.0, 0.3, 0.5),
+        (0.3, 0.67, 60.0, 0.22, 1.2),
+        (0.5, 1.0, 60.0, 0.22, 0.5),
+        (0.5, 0.67, 60.0, 0.22, 0.5),
+        (0.5, 0.67, 60.0, 0.14, 3.3),
+    ] {
+        let shaking = Shaking {
+            load_v,
+            lowest_hz,
+            rms_v,
+        };
+        let truth = Truth { friction, ..MODEL };
+        let activity = Activity::Shaken(shaking);
+        let settings = StageSettings::simulated();
+        let end = run_until_off(&settings, &truth, activity, Death::Frozen);
+        println!("{shaking:?}, friction x {friction}: {end:?}");
+        assert_eq!(end.fault, Some(FaultCode::EncoderImplausible), "{end:?}");
+        assert!(end.unplanned_mm < most_mm, "{shaking:?}: {end:?}");
+    }
 }
 
 #[test]

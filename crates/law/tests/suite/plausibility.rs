@@ -100,6 +100,7 @@ fn time_until_found(
             words: sum,
             reference: 0,
             open,
+            excited: open,
         };
         if !plausibility.step(&mut state, shown) {
             return Some(time_s);
@@ -511,6 +512,7 @@ fn gain_found_s(axis: &Plausibility, count: i32, moved_to: Option<i32>, first: i
         words: 0,
         reference: 0,
         open: false,
+        excited: false,
     };
     let mut state = axis.start(shown(count, 0.0));
     if let Some(count) = moved_to {
@@ -582,6 +584,7 @@ fn a_loop_that_is_opened_begins_its_standstill_anew() {
             words: 0,
             reference: 0,
             open: false,
+            excited: false,
         };
         let mut step = |state: &mut PlausibilityState| {
             shown.words = shown.words.wrapping_add(word);
@@ -611,6 +614,7 @@ fn a_spent_budget_says_nothing_of_a_closed_loop() {
         words: 0,
         reference: 0,
         open: true,
+        excited: true,
     };
     let word = 3 * AMPLIFIERS[0].per_volt as i32 * INTERVAL as i32;
     for _ in 0..1000 {
@@ -668,6 +672,7 @@ fn found_after(
             words: sum,
             reference: (jog_mm_s * (SLIDES_S + since_s) / COUNT_MM * 256.0).round() as i32,
             open: false,
+            excited: false,
         };
         if tick.is_multiple_of(INTERVAL) && !axis.step(&mut state, shown) {
             return Some(since_s);
@@ -925,4 +930,5 @@ const STANDS: Shown = Shown {
     words: 0,
     reference: 0,
     open: false,
+    excited: false,
 };
