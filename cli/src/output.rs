@@ -1,5 +1,6 @@
 //! Output of the commands: results to the terminal, pages into files.
 
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -96,6 +97,24 @@ impl Output {
         tempfile::tempfile_in(folder)
             .with_context(|| format!("cannot write to the folder {}", folder.display()))?;
         Ok(())
+    }
+
+    /// Keeps other commands that do the same from the folder until the result is dropped; none where the system locks no folders.
+    ///
+    /// # Errors
+    /// Another command that has it.
+    pub fn hold(&self) -> anyhow::Result<Option<File>> {
+        let folder = self.folder();
+        let Ok(held) = File::open(&folder) else {
+            return Ok(None);
+        };
+        match held.try_lock() {
+            Err(TryLockError::WouldBlock) => bail!(
+                "another command measures into {}: wait until it has ended, or give another --out",
+                folder.display()
+            ),
+            outcome => Ok(outcome.ok().map(|()| held)),
+        }
     }
 
     /// Writes a table where CSV is requested, and prints it.

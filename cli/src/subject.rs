@@ -112,6 +112,13 @@ pub(super) fn known_travel(
         None => machine.free_travel(axis)?,
     };
     let travel = known.with_context(|| unknown_travel(axis))?;
+    if travel.half_mm() < LEAST_ROOM_MM {
+        bail!(
+            "{axis} has a travel of {:.2} mm in all, and at least {} mm are needed: the first test is in open loop",
+            2.0 * travel.half_mm(),
+            2.0 * LEAST_ROOM_MM
+        );
+    }
     if travel.nearer_mm() < LEAST_ROOM_MM {
         bail!(
             "{axis} stands {:.2} mm from an end of its travel: move it to at least {LEAST_ROOM_MM} mm from it, for the first test is in \
@@ -211,6 +218,8 @@ impl Subject {
         let simulation = Simulation {
             seed,
             stage: self.stage.read()?,
+            // A simulated machine has the encoders and the rate of the settings to start from.
+            start: self.start(None)?.map(|file| file.stage),
             ..Simulation::default()
         };
         let known = simulation.stage.as_ref();

@@ -377,6 +377,7 @@ impl Job<'_> {
         let travel = known_travel(machine, axis, self.travel)?;
         let folder = output.below(axis.as_str());
         folder.ready()?;
+        let _held = folder.hold()?;
         let experiments = folder.file(EXPERIMENTS)?;
         let mut before = machine.settings()?;
         let settings_before = experiments.join(Journal::BEFORE);
@@ -1030,6 +1031,25 @@ mod tests {
             assert!(said.contains("--resume"), "{at}: {said}");
             assert!(Journal::count(&folder.path().join("x").join(EXPERIMENTS)) > 100);
         }
+    }
+
+    #[test]
+    fn a_folder_into_which_another_command_commissions_is_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut machine = Spoilt {
+            interrupted_at: Some("PID on"),
+            ..Spoilt::new()
+        };
+        assert!(commission_into(folder.path(), &mut machine).is_err());
+        let experiments = folder.path().join("x").join(EXPERIMENTS);
+        let kept = Journal::count(&experiments);
+        let other = std::fs::File::open(folder.path().join("x")).unwrap();
+        other.lock().unwrap();
+        let error = commission_into(folder.path(), &mut machine).err().unwrap();
+        let said = quadrant_cli::explained(&error);
+        assert!(said.contains("another command measures into"), "{said}");
+        assert_eq!(Journal::count(&experiments), kept);
+        assert!(Journal::begun(&experiments).is_some());
     }
 
     #[test]

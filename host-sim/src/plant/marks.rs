@@ -53,6 +53,11 @@ impl Marks {
         }
     }
 
+    /// The same marks of an axis that stands at zero.
+    pub(super) fn restarted(self) -> Self {
+        Self::new(self.truth)
+    }
+
     /// Returns the board's readings: the counter with what it latched at an index pulse on the way, and the switches.
     pub fn read(&mut self, counter: u32, position_mm: f64) -> (EncoderReading, AxisSwitches) {
         let truth = self.truth;

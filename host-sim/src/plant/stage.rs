@@ -36,6 +36,16 @@ impl SimulatedStage {
         }
     }
 
+    /// The same stage at rest at the origin, sampled at another rate.
+    #[must_use]
+    pub fn sampled_at(self, truth: &StageParameters, rate_hz: f64, seed: u64) -> Self {
+        Self {
+            marks: self.marks.map(Marks::restarted),
+            converters: self.converters,
+            ..Self::new(truth, rate_hz, seed)
+        }
+    }
+
     /// The same stage behind 12-bit converters, which get their words from `shaper`.
     #[must_use]
     pub fn behind_12_bits(mut self, shaper: NoiseShaper) -> Self {

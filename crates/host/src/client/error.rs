@@ -133,6 +133,12 @@ pub enum ClientError {
         /// The first path that is edited, and how many more there are.
         paths: String,
     },
+    /// Settings that a machine takes with a restart alone, and that a measurement was to begin with.
+    #[error(
+        "the settings have another encoder or control rate than the machine, which takes those with a restart alone; nothing was changed: \
+         `load` them in its console, `store` and `reboot`, then measure"
+    )]
+    NeedsRestart,
     /// Axes are not homed, and nothing homes them.
     #[error("wait homed: {axes} not homed, and not homing: give `home` first")]
     NotHoming {

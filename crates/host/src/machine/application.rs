@@ -34,6 +34,7 @@ const REQUESTS: usize = 3;
 pub struct Running<S: Scalar> {
     control: Control<'static, 'static, S>,
     slow: SlowHalf<S>,
+    rate_hz: f64,
 }
 
 /// The slow half of the application: what the supervising task and the server do, on the fast half's snapshots.
@@ -218,8 +219,17 @@ impl<S: Scalar> Running<S> {
     /// # Errors
     /// The first of the settings for an empty flash that is refused.
     pub fn start(start: Start<'_>, flash: MemoryFlash) -> Result<Self, SettingsError> {
-        let (control, slow, _) = start_halves(start, flash)?;
-        Ok(Self { control, slow })
+        let (control, slow, settings) = start_halves(start, flash)?;
+        Ok(Self {
+            control,
+            slow,
+            rate_hz: settings.rate_hz,
+        })
+    }
+
+    /// Control rate of the settings that it started with, Hz.
+    pub const fn rate_hz(&self) -> f64 {
+        self.rate_hz
     }
 
     /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.

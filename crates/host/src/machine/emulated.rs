@@ -19,7 +19,7 @@ use quadrant_sim::plant::SimulatedStage;
 use quadrant_sim::stage_setup::StageSetup;
 
 use super::emulator::{EmulatorError, Lockstep, Memory, Program};
-use super::timing::{OFF_TICKS, port_bytes};
+use super::timing::{off_ticks, port_bytes};
 use crate::machine::emulator::record_of;
 
 /// The job of a machine whose flash is empty: its settings, without a motion.
@@ -36,6 +36,8 @@ fn first_job(settings: &StageSettings) -> Vec<u8> {
 pub struct EmulatedMachine {
     lockstep: Lockstep,
     plant: SimulatedStage,
+    /// Control rate of a machine whose flash is empty, Hz: the plant's, also where the flash says another.
+    rate_hz: f64,
     /// What the firmware is given at each start, encoded.
     job: Vec<u8>,
     port: HostPort,
@@ -76,13 +78,14 @@ impl EmulatedMachine {
         let job = first_job(settings);
         memory.prepare(Mode::Lockstep, 0, &job)?;
         let port = HostPort {
-            room: port_bytes(settings).min(LINK_BYTES),
+            room: port_bytes(settings.rate_hz).min(LINK_BYTES),
             ..HostPort::default()
         };
         port.reset(&memory)?;
         Ok(Self {
             lockstep: Lockstep::start(program, memory, |_| {})?,
             plant,
+            rate_hz: settings.rate_hz,
             job,
             port,
             outputs: Outputs::default(),
@@ -204,7 +207,7 @@ impl EmulatedMachine {
     /// QEMU does not start.
     pub fn power_cycle(&mut self) -> Result<(), EmulatorError> {
         self.outputs = Outputs::default();
-        for _ in 0..OFF_TICKS {
+        for _ in 0..off_ticks(self.rate_hz) {
             self.plant.step(&self.outputs);
         }
         self.restart()

@@ -45,7 +45,7 @@ impl EmulatedLink {
         Ok(Loopback::new(Self {
             machine,
             flash,
-            period: server_period(&setup.settings),
+            period: server_period(setup.settings.rate_hz),
         }))
     }
 }

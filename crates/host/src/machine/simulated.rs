@@ -14,7 +14,7 @@ use quadrant_sim::plant::{SimulatedStage, StageParameters};
 
 use super::application::{BoardIdentity, Running, Start};
 use super::memory_flash::MemoryFlash;
-use super::timing::{OFF_TICKS, port_bytes};
+use super::timing::{off_ticks, port_bytes};
 
 /// Name, timer and number type for the greeting.
 const IDENTITY: BoardIdentity = BoardIdentity {
@@ -62,10 +62,11 @@ fn start<'a>(defaults: &'a StageSettings, plan: &'a PlanSettings) -> Start<'a> {
 pub struct SimulatedMachine {
     running: Running<f32>,
     plant: SimulatedStage,
+    truth: StageParameters,
+    /// Of the plant's noise.
+    seed: u64,
     defaults: StageSettings,
     wire: Wire,
-    /// Bytes that the wire carries in a run of the server.
-    port_bytes: usize,
     outputs: Outputs,
     /// Inputs that somebody holds pressed, beside those of the stage.
     pressed: Switches,
@@ -96,12 +97,14 @@ impl SimulatedMachine {
         seed: u64,
         flash: MemoryFlash,
     ) -> Result<Self, SettingsError> {
+        let running = Running::start(start(settings, &PlanSettings::default()), flash)?;
         Ok(Self {
-            running: Running::start(start(settings, &PlanSettings::default()), flash)?,
-            plant: SimulatedStage::new(truth, settings.rate_hz, seed),
+            plant: SimulatedStage::new(truth, running.rate_hz(), seed),
+            running,
+            truth: truth.clone(),
+            seed,
             defaults: settings.clone(),
             wire: Wire::default(),
-            port_bytes: port_bytes(settings),
             outputs: Outputs::default(),
             pressed: Switches::NONE,
             been_mm: [(0.0, 0.0); 3],
@@ -111,6 +114,11 @@ impl SimulatedMachine {
     /// Control ticks since the last start.
     pub fn tick(&self) -> u32 {
         self.running.state().tick()
+    }
+
+    /// Control rate since the last start, Hz.
+    pub fn rate_hz(&self) -> f64 {
+        self.running.rate_hz()
     }
 
     /// The outputs of the last tick.
@@ -158,7 +166,7 @@ impl SimulatedMachine {
     fn step(&mut self) {
         let mut inputs = self.plant.read_inputs(None);
         inputs.switches = inputs.switches.with(self.pressed);
-        self.wire.room = self.port_bytes;
+        self.wire.room = port_bytes(self.rate_hz());
         let (outputs, after) = self.running.tick(&inputs, &mut self.wire);
         self.outputs = outputs;
         self.plant.step(&self.outputs);
@@ -171,21 +179,27 @@ impl SimulatedMachine {
         }
     }
 
-    /// Starts the firmware afresh: what is in flash stays, and the stage stands where it stands.
+    /// Starts the firmware again: what is in flash stays, and the stage stands where it stands; at another control rate, where it stood at
+    /// first.
     pub fn restart(&mut self) {
         let flash = self.flash().clone();
+        let rate_hz = self.rate_hz();
         let plan = PlanSettings::default();
         match Running::start(start(&self.defaults, &plan), flash) {
             Ok(running) => self.running = running,
             // The defaults were accepted when the machine was made.
             Err(_) => unreachable!("the same settings were accepted before"),
         }
+        if self.rate_hz() != rate_hz {
+            let plant = self.plant.clone();
+            self.plant = plant.sampled_at(&self.truth, self.rate_hz(), self.seed);
+        }
     }
 
     /// Cuts the supply, lets the stage coast, and switches it on again: what is in flash stays.
     pub fn power_cycle(&mut self) {
         self.outputs = Outputs::default();
-        for _ in 0..OFF_TICKS {
+        for _ in 0..off_ticks(self.rate_hz()) {
             self.plant.step(&self.outputs);
         }
         // What was on its way to the machine is lost.

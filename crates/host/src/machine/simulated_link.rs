@@ -17,7 +17,6 @@ use super::timing::server_period;
 /// The firmware's application on a simulated stage, and the bytes to and from it.
 pub struct SimulatedLink {
     machine: SimulatedMachine,
-    period: Duration,
 }
 
 impl SimulatedLink {
@@ -40,10 +39,7 @@ impl SimulatedLink {
         let mut machine =
             SimulatedMachine::with_flash(settings, truth, seed, flash).map_err(io::Error::other)?;
         machine.plant_mut().set_marks(*marks);
-        Ok(Loopback::new(Self {
-            machine,
-            period: server_period(settings),
-        }))
+        Ok(Loopback::new(Self { machine }))
     }
 }
 
@@ -59,7 +55,7 @@ impl SimulatedPeer for SimulatedLink {
     }
 
     fn period(&self) -> Duration {
-        self.period
+        server_period(self.machine.rate_hz())
     }
 
     fn simulated_io(&mut self) -> Option<&mut dyn SimulatedIo> {

@@ -3,19 +3,23 @@
 use std::time::Duration;
 
 use quadrant_law::supervisor::PERIOD_TICKS;
-use quadrant_settings::StageSettings;
 
 /// Bytes that the port carries in a second: 921 600 baud.
 const PORT_BYTES_PER_S: f64 = 92_160.0;
-/// Ticks without supply in a power cycle: 1 s at 10 kHz.
-pub(super) const OFF_TICKS: u32 = 10_000;
+/// Time without supply in a power cycle, s.
+const OFF_S: f64 = 1.0;
+
+/// Control ticks without supply in a power cycle.
+pub(super) fn off_ticks(rate_hz: f64) -> u32 {
+    (OFF_S * rate_hz) as u32
+}
 
 /// Time between two runs of the server, each of which reads its port once.
-pub(super) fn server_period(settings: &StageSettings) -> Duration {
-    Duration::from_secs_f64(f64::from(PERIOD_TICKS) / settings.rate_hz)
+pub(super) fn server_period(rate_hz: f64) -> Duration {
+    Duration::from_secs_f64(f64::from(PERIOD_TICKS) / rate_hz)
 }
 
 /// Bytes that the port carries between two runs of the server.
-pub(super) fn port_bytes(settings: &StageSettings) -> usize {
-    (PORT_BYTES_PER_S * server_period(settings).as_secs_f64()) as usize
+pub(super) fn port_bytes(rate_hz: f64) -> usize {
+    (PORT_BYTES_PER_S * server_period(rate_hz).as_secs_f64()) as usize
 }

@@ -443,3 +443,55 @@ fn the_cross_checks_of_an_axis_of_50_mm_s_are_made_within_its_limits() {
     let ratio = revised.unwrap().plant.gain_mm_per_v_s2 / settings.plant.unwrap().gain_mm_per_v_s2;
     assert!((0.9..1.1).contains(&ratio), "A {ratio} times the settings'");
 }
+
+#[test]
+fn a_machine_that_restarts_at_another_rate_runs_on_its_clock() {
+    let mut client = client();
+    let mut stage = settings::in_force(&mut client).unwrap();
+    stage.rate_hz = 5e3;
+    for axis in &mut stage.axes {
+        axis.feedback.pid.derivative_filter_s = 1e-4;
+    }
+    settings::load(&mut client, &stage).unwrap();
+    settings::store(&mut client, "a test").unwrap();
+    client.order(Body::Reboot).unwrap();
+    client.restarted().unwrap();
+    assert_eq!(client.identity().rate_hz, 5e3);
+    let (before, began) = (client.status().unwrap().tick, client.now());
+    client.wait(Duration::from_secs(1)).unwrap();
+    let ticks = client.status().unwrap().tick.wrapping_sub(before);
+    let lasted_s = client.now().saturating_sub(began).as_secs_f64();
+    let rate_hz = f64::from(ticks) / lasted_s;
+    assert!((rate_hz / 5e3 - 1.0).abs() < 0.01, "{rate_hz}");
+    let mut axis = ConnectedAxis::new(&mut client, AxisName::X, Travel::either_way(20.0)).unwrap();
+    let experiment = Experiment {
+        name: "a move".to_owned(),
+        drive: Drive::ClosedLoop(MotionSettings::PointToPoint(PointToPointSettings {
+            distance_mm: 10.0,
+            max_velocity_mm_s: 50.0,
+            max_acceleration_mm_s2: 500.0,
+            max_jerk_mm_s3: 5e3,
+        })),
+        injection_v: Vec::new(),
+        decimation: 1,
+        time_limit_s: 5.0,
+    };
+    let recording = axis.perform(&experiment, &mut |_| {}).unwrap();
+    let errors = recording.reference_mm.iter().zip(&recording.position_mm);
+    let most_mm = errors.map(|(r, p)| (r - p).abs()).fold(0.0, f64::max);
+    assert!(most_mm < 0.02, "{most_mm}");
+}
+
+#[test]
+fn settings_that_need_a_restart_are_refused_and_leave_the_machine_as_it_was() {
+    let mut client = client();
+    let mut axis = ConnectedAxis::new(&mut client, AxisName::X, Travel::either_way(20.0)).unwrap();
+    let before = axis.settings().clone();
+    let mut other = before.clone();
+    other.encoder.resolution_mm *= 2.0;
+    let refused = axis.apply(&other).unwrap_err().to_string();
+    assert!(refused.contains("`store` and `reboot`"), "{refused}");
+    assert_eq!(*axis.settings(), before);
+    axis.apply(&before).unwrap();
+    assert_eq!(settings::edited(&mut client).unwrap(), Vec::new());
+}

@@ -124,7 +124,7 @@ impl Commissioned {
         let high_mm = self.ran.iter().map(|run| run.span_mm.1);
         let stopped = self.ran.iter().filter(|run| !run.ended).count();
         format!(
-            "{minutes:.1} minutes of axis time: {} experiments between {:.1} and {:.1} mm, {stopped} of which were stopped by \
+            "{minutes:.1} minutes of axis time: {} experiments between {:.1} and {:.1} mm from the middle of the travel, {stopped} of which were stopped by \
              their limits and repeated more gently.",
             self.ran.len(),
             low_mm.fold(f64::INFINITY, f64::min),

@@ -171,8 +171,8 @@ impl<'a> Guard<'a> {
             return Err(ExperimentError::Impossible {
                 experiment: experiment.name.clone(),
                 reason: format!(
-                    "it would go from {low_mm:.2} to {high_mm:.2} mm, and {usable_mm:.2} mm either way are used: more --travel \
-                     is needed"
+                    "it would go from {low_mm:.2} to {high_mm:.2} mm, and {usable_mm:.2} mm either way are used: the axis needs \
+                     more travel"
                 ),
             });
         }
@@ -306,7 +306,7 @@ mod tests {
         guard.apply(&settings).unwrap();
         guard.perform(&to(6.0), &mut |_| {}).unwrap();
         let refused = guard.perform(&to(3.0), &mut |_| {}).unwrap_err();
-        assert!(refused.to_string().contains("more --travel"), "{refused}");
+        assert!(refused.to_string().contains("more travel"), "{refused}");
         assert_eq!(guard.runs.len(), 1);
         guard.perform(&to(-12.0), &mut |_| {}).unwrap();
     }

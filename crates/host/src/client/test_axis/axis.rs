@@ -6,7 +6,7 @@ use quadrant::app::Translated;
 use quadrant_law::axes::AxisName;
 use quadrant_law::reference::MotionSettings;
 use quadrant_law::safety::FaultCode;
-use quadrant_link::message::{AxisSignal, Body, Channel, MachineState};
+use quadrant_link::message::{AxisSignal, Body, Channel, MachineState, SettingsRequest};
 use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_tune::record::Recording;
 use quadrant_tune::test_axis::{
@@ -378,9 +378,16 @@ impl TestAxis for ConnectedAxis<'_> {
         let mut stage = self.stage.clone();
         stage.axes[self.axis as usize] = settings.clone();
         stage.validate(quadrant_law::friction::gms::FIRMWARE_ELEMENTS)?;
-        self.disabled_for(&stage)
+        let loaded = self
+            .disabled_for(&stage)
             .and_then(|()| settings::load(self.client, &stage))
             .map_err(|error| MachineError::Connection(Box::new(error)))?;
+        if loaded.applied.restart_needed {
+            let revert = Body::Settings(SettingsRequest::Revert);
+            let reverted = self.client.order(revert);
+            let error = reverted.err().unwrap_or(ClientError::NeedsRestart);
+            return Err(MachineError::Connection(Box::new(error)));
+        }
         self.stage = stage;
         Ok(())
     }
