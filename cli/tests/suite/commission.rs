@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::command::succeed;
+use crate::command::{fail, succeed};
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_settings::AxisSettings;
 use quadrant_sim::settings_file::SettingsFile;
@@ -127,4 +127,13 @@ fn a_commissioned_axis_beats_its_pid_and_its_settings_replay() {
     );
     assert!(shown.contains("N-PID + static + GMS"), "{shown}");
     assert!(at.join("replay/replay.html").exists());
+}
+
+#[test]
+fn a_travel_that_is_too_short_for_any_place_is_said_to_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = "commission --axis x --machine simulated --travel 1";
+    let words: Vec<&str> = line.split(' ').collect();
+    let refused = fail(folder.path(), &words);
+    assert!(refused.contains("at least 4 mm"), "{refused}");
 }

@@ -178,16 +178,14 @@ fn a_simulated_machine_is_measured_with_the_rate_and_the_encoder_of_the_settings
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     command::succeed(at, &new(&["--rate", "1000"]));
-    let measure =
-        "identify motor-constant --axis x --settings mine.toml --travel 40 --machine simulated";
-    let words: Vec<&str> = measure.split(' ').collect();
-    let shown = command::succeed(at, &words);
+    let measure = |machine: &'static str| {
+        let line = "identify motor-constant --axis x --settings mine.toml --travel 40 --machine";
+        line.split(' ').chain([machine]).collect::<Vec<_>>()
+    };
+    let shown = command::succeed(at, &measure("simulated"));
     assert!(shown.contains("mm/(V s"), "{shown}");
     let before = fs::read(at.join("quadrant-out/motor-constant.csv")).unwrap();
-    let measure =
-        "identify motor-constant --axis x --settings mine.toml --machine simulated:commissioned";
-    let words: Vec<&str> = measure.split(' ').collect();
-    let refused = command::fail(at, &words);
+    let refused = command::fail(at, &measure("simulated:commissioned"));
     assert!(refused.contains("`store` and `reboot`"), "{refused}");
     let after = fs::read(at.join("quadrant-out/motor-constant.csv")).unwrap();
     assert_eq!(before, after);

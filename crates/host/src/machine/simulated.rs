@@ -67,6 +67,8 @@ pub struct SimulatedMachine {
     seed: u64,
     defaults: StageSettings,
     wire: Wire,
+    /// Bytes that the wire carries in a run of the server, at the rate since the last start.
+    port_bytes: usize,
     outputs: Outputs,
     /// Inputs that somebody holds pressed, beside those of the stage.
     pressed: Switches,
@@ -100,6 +102,7 @@ impl SimulatedMachine {
         let running = Running::start(start(settings, &PlanSettings::default()), flash)?;
         Ok(Self {
             plant: SimulatedStage::new(truth, running.rate_hz(), seed),
+            port_bytes: port_bytes(running.rate_hz()),
             running,
             truth: truth.clone(),
             seed,
@@ -166,7 +169,7 @@ impl SimulatedMachine {
     fn step(&mut self) {
         let mut inputs = self.plant.read_inputs(None);
         inputs.switches = inputs.switches.with(self.pressed);
-        self.wire.room = port_bytes(self.rate_hz());
+        self.wire.room = self.port_bytes;
         let (outputs, after) = self.running.tick(&inputs, &mut self.wire);
         self.outputs = outputs;
         self.plant.step(&self.outputs);
@@ -193,6 +196,7 @@ impl SimulatedMachine {
         if self.rate_hz() != rate_hz {
             let plant = self.plant.clone();
             self.plant = plant.sampled_at(&self.truth, self.rate_hz(), self.seed);
+            self.port_bytes = port_bytes(self.rate_hz());
         }
     }
 
