@@ -70,6 +70,17 @@ fn a_law_that_is_worse_on_slow_motions_of_millimetres_is_the_pid_there() {
     });
 }
 
+/// Beside the mode of each, two poles that do not resonate were taken for another.
+#[test]
+fn poles_that_do_not_resonate_do_not_spoil_the_acceleration_per_volt() {
+    [28_555, 28_015].into_par_iter().for_each(|seed| {
+        let line = judge(seed, Judging::Usual);
+        println!("{line:?}");
+        let ratio = line.gain_ratio.unwrap();
+        assert!((0.7..1.4).contains(&ratio), "{line:?}");
+    });
+}
+
 #[test]
 fn the_cheapest_of_the_named_axes_are_commissioned() {
     let names = ["travel of 10 mm either way", "travel of -3 to 37 mm"];

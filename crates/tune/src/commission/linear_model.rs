@@ -59,7 +59,13 @@ pub(super) fn linear_model(
         }
         let found =
             under_first_controllers(test_axis, base, request, motor, misjudged, &mut *progress)?;
-        test_axis.slowed_by(by_friction(found.plant.plant.gain_mm_per_v_s2, motor));
+        let gain = found.plant.plant.gain_mm_per_v_s2;
+        let least = if found.plant.is_determined() {
+            gain
+        } else {
+            gain.min(motor.gain_mm_per_v_s2)
+        };
+        test_axis.slowed_by(by_friction(least, motor));
         Ok(found)
     };
     let first: CommissionError = match model(test_axis, &motor, 1.0) {
@@ -145,7 +151,7 @@ fn to_the_middle(
 /// The response of the sliding axis under a first controller, the linear model, and the controller that is designed on it. A mode
 /// that the first controller excites spoils them: they are repeated with softer ones, as soft as the frequency demands that was seen.
 /// `misjudged`: factor on the acceleration per volt that the open-loop test showed; where it is not 1, friction is fed forward from the
-/// first of them on, and not just from where the axis lags by it.
+/// first of them on, and not just from where the axis lags by it. Where no response determines a model, the first model that describes one is taken.
 fn under_first_controllers(
     test_axis: &mut Guard<'_>,
     base: &AxisSettings,
@@ -158,10 +164,21 @@ fn under_first_controllers(
     let gain = misjudged * motor.gain_mm_per_v_s2;
     let is_short = test_axis.info().travel_mm < SHORT_TRAVEL_MM;
     let feeds_at = |share: f64| share < 1.0 || is_short || misjudged != 1.0;
-    let attempt = |test_axis: &mut Guard<'_>,
-                   share: f64,
-                   trim: f64,
-                   progress: &mut dyn FnMut(f64)|
+    let linear = |response: &FrfMeasurement, determined| -> Result<Linear, CommissionError> {
+        let wishes = (base, request);
+        let (plant, controller) = models::designed(response, determined, wishes, motor, rate_hz)?;
+        Ok(Linear {
+            motor: motor.clone(),
+            response: response.clone(),
+            plant,
+            controller,
+        })
+    };
+    let mut described = None;
+    let mut attempt = |test_axis: &mut Guard<'_>,
+                       share: f64,
+                       trim: f64,
+                       progress: &mut dyn FnMut(f64)|
      -> Result<Linear, CommissionError> {
         let mut settings = first_controller(base, motor, gain, rate_hz, share);
         if feeds_at(share) {
@@ -170,14 +187,11 @@ fn under_first_controllers(
         }
         test_axis.apply(&settings)?;
         let response = sliding_response(test_axis, gain, progress)?;
-        let plant = models::plant(&response)?;
-        let controller = models::controller(&plant, base, request, motor, rate_hz)?;
-        Ok(Linear {
-            motor: motor.clone(),
-            response,
-            plant,
-            controller,
-        })
+        let found = linear(&response, true);
+        if found.is_err() && described.is_none() {
+            described = linear(&response, false).ok().map(|found| (found, settings));
+        }
+        found
     };
     let first = match attempt(test_axis, 1.0, 1.0, progress) {
         Ok(found) => return Ok(found),
@@ -211,6 +225,11 @@ fn under_first_controllers(
                 seen = now.or(seen);
             }
         }
+    }
+    if let Some((found, settings)) = described {
+        test_axis.apply(&settings)?;
+        approach(test_axis, HOME_MM)?;
+        return Ok(found);
     }
     Err(match seen {
         Some(seen) => CommissionError::rings(seen, first),

@@ -126,21 +126,30 @@ pub(super) fn process(plant: &PlantFit, filters: &[FilterSettings]) -> Process {
     }
 }
 
-/// Fits the linear model to the response.
-pub(super) fn plant(response: &FrfMeasurement) -> Result<PlantFit, CommissionError> {
-    Ok(fit_plant(
+/// Fits the linear model to the response, and designs the PID on it. `determined`: [`PlantFitSettings::determined`].
+pub(super) fn designed(
+    response: &FrfMeasurement,
+    determined: bool,
+    (base, request): (&AxisSettings, &CommissionSettings),
+    motor: &MotorConstant,
+    rate_hz: f64,
+) -> Result<(PlantFit, Controller), CommissionError> {
+    let plant = fit_plant(
         &response.estimate.response,
         &PlantFitSettings {
             stiffness: Stiffness::Zero,
             negligible_damping: true,
+            determined,
             ..PlantFitSettings::default()
         },
-    )?)
+    )?;
+    let controller = controller(&plant, base, request, motor, rate_hz)?;
+    Ok((plant, controller))
 }
 
 /// Designs the PID, and filters where modes want them, on the linear model; with so slow a filter of the derivative that the encoder's
 /// noise, as the motor-constant test shows it at rest, does not shake the axis out of its friction.
-pub(super) fn controller(
+fn controller(
     plant: &PlantFit,
     base: &AxisSettings,
     request: &CommissionSettings,
@@ -325,6 +334,10 @@ fn resolved(
     gms
 }
 
+/// What a linear model is worth that only describes the response, for a person.
+const UNDETERMINED: &str = "The response does not determine the linear model: it describes the axis well enough for a PID, but its A may be \
+                            wrong several times over, and fault 28 may come where the axis is struck. Look for play in the drive, and for a \
+                            soft spring between motor and table.";
 /// Share of the identified stiffness that the control rate resolves, below which that is worth a note.
 const NOTED_STIFFNESS_SHARE: f64 = 0.8;
 /// Share of the largest value that the law resolves: just below 1, so that rounding loses none of it.
@@ -341,8 +354,11 @@ impl Measurements {
         request: &CommissionSettings,
         rate_hz: f64,
     ) -> Result<Commissioned, CommissionError> {
-        let plant = plant(&self.response)?;
-        let controller = controller(&plant, base, request, &self.motor, rate_hz)?;
+        let design = |determined| {
+            let wishes = (base, request);
+            designed(&self.response, determined, wishes, &self.motor, rate_hz)
+        };
+        let (plant, controller) = design(true).or_else(|error| design(false).map_err(|_| error))?;
         let friction = friction(&self.map, viscous(&plant))?;
         let gms = presliding(&self.presliding, &friction);
         let models = Models {
@@ -405,6 +421,9 @@ impl Models {
         let elements = resolved(elements, &sliding, &plant.plant, rate_hz);
         let resolved_v_per_mm = elements.stiffness_v_per_mm();
         let mut remarks = controller.remarks.clone();
+        if !plant.is_determined() {
+            remarks.push(UNDETERMINED.to_owned());
+        }
         if gms.is_ok() && resolved_v_per_mm < NOTED_STIFFNESS_SHARE * identified_v_per_mm {
             remarks.push(format!(
                 "Before it slides, the axis is as stiff as {identified_v_per_mm:.1} V/mm, and {rate_hz} Hz resolves \

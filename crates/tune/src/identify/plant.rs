@@ -60,6 +60,9 @@ pub struct PlantFitSettings {
     pub stiffness: Stiffness,
     /// True if a damping whose corner lies below the band may stay unknown: an axis that friction governs has as good as none.
     pub negligible_damping: bool,
+    /// True if the response must determine the model, and what is called a mode must resonate. Else two poles that only bend the response may
+    /// be called one: a controller can be designed on such a model, but its A may be wrong several times over.
+    pub determined: bool,
 }
 
 impl Default for PlantFitSettings {
@@ -69,6 +72,7 @@ impl Default for PlantFitSettings {
             band_hz: (0.0, f64::INFINITY),
             stiffness: Stiffness::Free,
             negligible_damping: false,
+            determined: true,
         }
     }
 }
@@ -87,6 +91,11 @@ pub struct PlantFit {
 }
 
 impl PlantFit {
+    /// True if the response determines A, and each mode resonates: see [`PlantFitSettings::determined`].
+    pub fn is_determined(&self) -> bool {
+        is_determined(&self.fit, &self.modes)
+    }
+
     /// Standard deviation of B, 1/s; infinite of one that may be none.
     pub fn damping_error_per_s(&self) -> f64 {
         self.fit.standard_errors[1]
@@ -232,7 +241,7 @@ fn fit_lines(
     settings: &PlantFitSettings,
     dampers: bool,
 ) -> Result<PlantFit, PlantError> {
-    let (found, model) = with_modes(lines, settings.stiffness, dampers)?;
+    let (found, model) = with_modes(lines, settings, dampers)?;
     let plant = model.plant;
     let bands = bands(lines, &model);
     let all = band_misfit(lines, &model);
@@ -244,7 +253,7 @@ fn fit_lines(
             mode_hz: model.modes.first().map(|mode| mode.frequency_hz),
         });
     }
-    check_support(lines, &model, &found, settings.negligible_damping)?;
+    check_support(lines, &model, &found, settings)?;
     Ok(PlantFit {
         plant,
         modes: model.modes,
@@ -358,6 +367,8 @@ const STARTS: usize = 14;
 const TRIED_LINES: usize = 160;
 /// Least and largest damping ratio of a mode.
 const DAMPINGS: (f64, f64) = (1e-3, 0.5);
+/// Damping ratio below which a mode resonates: one that ends at the largest is something else.
+const LARGEST_DAMPING: f64 = 0.98 * DAMPINGS.1;
 /// Damping ratio from which its fit starts.
 const DAMPING_START: f64 = 0.03;
 /// Start of an anti-resonance over the mode's frequency: of equal masses.
@@ -371,12 +382,13 @@ const DAMPERS: (f64, f64) = (MIN_TRANSMITTING_DAMPING, 5.0);
 /// Largest relative standard error of a mode's frequency.
 const MOST_UNCERTAIN_MODE: f64 = 0.05;
 
-/// The rigid model, and modes as long as they explain enough.
+/// The rigid model, and modes as long as they explain enough; where the response must determine the model, the last that it does.
 fn with_modes(
     lines: &[ResponsePoint],
-    stiffness: Stiffness,
+    settings: &PlantFitSettings,
     dampers: bool,
 ) -> Result<(Fit, Model), FitError> {
+    let stiffness = settings.stiffness;
     let start = Model {
         plant: linear_start(lines, stiffness),
         modes: Vec::new(),
@@ -388,6 +400,7 @@ fn with_modes(
         .copied()
         .collect();
     let mut modes = Vec::new();
+    let mut accepted = rigid.clone();
     let mut best = rigid;
     let explained = |best: &Result<(Fit, Model), FitError>| {
         let small =
@@ -405,19 +418,38 @@ fn with_modes(
             Ok((_, before)) => LEAST_DROP * cost(lines, &fit.1) < cost(lines, before),
             Err(_) => true,
         };
-        let first = stiffness.unknowns() + 1;
-        // A damper has no frequency of its own.
-        let determined = (first..fit.0.values.len())
-            .step_by(2)
-            .filter(|index| fit.0.values[index + 1] < MIN_TRANSMITTING_DAMPING)
-            .all(|index| fit.0.standard_errors[index] < MOST_UNCERTAIN_MODE * fit.0.values[index]);
-        if !better || !determined {
+        if !better || !is_resolved(&fit.0) {
             break;
         }
         modes.clone_from(&fit.1.modes);
+        // Two poles too many for one mode may turn into a second.
+        if !settings.determined || is_determined(&fit.0, &modes) {
+            accepted = Ok(fit.clone());
+        }
         best = Ok(fit);
     }
-    best
+    accepted
+}
+
+/// True if the response determines the frequencies of all that resonates.
+fn is_resolved(found: &Fit) -> bool {
+    let first = found
+        .names
+        .iter()
+        .position(|name| *name == MODE_NAMES[0][0]);
+    // A damper has no frequency of its own.
+    (first.unwrap_or(found.values.len())..found.values.len())
+        .step_by(2)
+        .filter(|index| found.values[index + 1] < MIN_TRANSMITTING_DAMPING)
+        .all(|index| found.standard_errors[index] < MOST_UNCERTAIN_MODE * found.values[index])
+}
+
+/// True if, moreover, every mode resonates, and A is determined.
+fn is_determined(found: &Fit, modes: &[Mode]) -> bool {
+    let resonates = |mode: &Mode| mode.damping < LARGEST_DAMPING;
+    is_resolved(found)
+        && modes.iter().all(resonates)
+        && found.standard_errors[0] < MOST_UNCERTAIN * found.values[0]
 }
 
 fn antis(modes: &[Mode]) -> Vec<bool> {
@@ -584,7 +616,7 @@ fn check_support(
     lines: &[ResponsePoint],
     model: &Model,
     found: &Fit,
-    negligible_damping: bool,
+    settings: &PlantFitSettings,
 ) -> Result<(), PlantError> {
     let low_hz = lines.first().map_or(0.0, |line| line.frequency_hz);
     let high_hz = lines.last().map_or(0.0, |line| line.frequency_hz);
@@ -594,9 +626,11 @@ fn check_support(
         let deviation = relative(index);
         deviation.is_nan() || deviation > MOST_UNCERTAIN
     };
-    let negligible = negligible_damping && corner_hz < NEGLIGIBLE_CORNER_RATIO * low_hz;
+    let negligible = settings.negligible_damping && corner_hz < NEGLIGIBLE_CORNER_RATIO * low_hz;
     let distinguishable = !uncertain(1) && low_hz <= 1.5 * corner_hz.max(0.1);
-    if uncertain(0) || high_hz < 1.5 * corner_hz || !(negligible || distinguishable) {
+    let described = !settings.determined && !model.modes.is_empty();
+    let known = described || !uncertain(0) && (negligible || distinguishable);
+    if !known || high_hz < 1.5 * corner_hz {
         return Err(PlantError::MissesCorner {
             low_hz,
             high_hz,
@@ -671,6 +705,7 @@ mod tests {
         band_hz: (0.0, f64::INFINITY),
         stiffness: Stiffness::Zero,
         negligible_damping: false,
+        determined: true,
     };
 
     /// Lines every 2 Hz from 4 to 400 Hz, with errors of one percent.
@@ -736,7 +771,7 @@ mod tests {
                 plant: found.plant,
                 modes: anti.iter().map(mode).collect(),
             };
-            check_support(&lines, &model, &found.fit, false)
+            check_support(&lines, &model, &found.fit, &SLIDING)
         };
         let refused = |anti| matches!(checked(anti), Err(PlantError::Undetermined { .. }));
         assert!(refused(&[]));
@@ -775,6 +810,29 @@ mod tests {
                 });
             }
         }
+    }
+
+    #[test]
+    fn poles_that_do_not_resonate_are_a_mode_only_where_a_description_will_do() {
+        let overdamped = Mode {
+            frequency_hz: 28.0,
+            damping: 1.1,
+            anti: None,
+        };
+        let lines = response(&[overdamped]);
+        let refused = fit_plant(&lines, &SLIDING).unwrap_err();
+        assert!(matches!(refused, PlantError::Misfit { .. }), "{refused:?}");
+        let described = PlantFitSettings {
+            determined: false,
+            ..SLIDING
+        };
+        let found = fit_plant(&lines, &described).unwrap();
+        assert!(!found.is_determined());
+        assert!(
+            found.bands.iter().all(BandMisfit::is_small),
+            "{:?}",
+            found.bands
+        );
     }
 
     #[test]

@@ -13,6 +13,7 @@ const SLIDING: PlantFitSettings = PlantFitSettings {
     band_hz: (0.0, f64::INFINITY),
     stiffness: Stiffness::Zero,
     negligible_damping: false,
+    determined: true,
 };
 
 fn truth(axis: usize, noise: f64) -> AxisParameters {

@@ -337,11 +337,18 @@ impl<'a, F: Fn(&[f64]) -> Vec<f64> + Sync> Problem<'a, F> {
                 }
             }
         }
-        let deviation = |index: usize| inverse[(index, index)].max(0.0).sqrt();
+        // No variance is zero or less but by rounding, of an inverse that has lost its digits.
+        let deviation = |index: usize| match inverse[(index, index)] {
+            variance if variance > 0.0 => variance.sqrt(),
+            _ => f64::INFINITY,
+        };
         Fit {
             names: self.parameters.iter().map(|p| p.name).collect(),
             standard_errors: (0..count)
-                .map(|index| variance.sqrt() * deviation(index) * steps[index])
+                .map(|index| match deviation(index) {
+                    f64::INFINITY => f64::INFINITY,
+                    deviation => variance.sqrt() * deviation * steps[index],
+                })
                 .collect(),
             correlation: DMatrix::from_fn(count, count, |row, column| {
                 if row == column {

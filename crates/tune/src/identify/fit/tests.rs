@@ -119,6 +119,27 @@ fn parameters_that_the_data_hardly_distinguish_are_seen_to_be_correlated() {
 }
 
 #[test]
+fn what_the_data_do_not_distinguish_has_no_small_standard_error() {
+    let data = decay(0.01, 1);
+    let other = Parameter {
+        name: "other",
+        ..LEVEL
+    };
+    for exponent in 4..14 {
+        let apart = 0.1_f64.powi(exponent);
+        let fit = fit_nearest(&[LEVEL, other], Loss::Squares, |p| {
+            data.iter()
+                .map(|(t, y)| p[0] * (-2.0 * t).exp() + p[1] * (-(2.0 + apart) * t).exp() - y)
+                .collect()
+        })
+        .unwrap();
+        for error in fit.standard_errors {
+            assert!(error > 10.0, "{error} with rates {apart} apart");
+        }
+    }
+}
+
+#[test]
 fn too_few_data_and_bad_starts_are_refused() {
     let few = fit(&[LEVEL, RATE], Loss::Squares, |_| vec![0.0; 2]);
     assert!(matches!(few, Err(FitError::TooFewData { .. })));
