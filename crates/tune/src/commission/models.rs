@@ -334,7 +334,7 @@ fn resolved(
     gms
 }
 
-/// What a linear model is worth that only describes the response, for a person.
+/// Remark on a linear model that only describes the response, for a person.
 const UNDETERMINED: &str = "The response does not determine the linear model: it describes the axis well enough for a PID, but its A may be \
                             wrong several times over, and fault 28 may come where the axis is struck. Look for play in the drive, and for a \
                             soft spring between motor and table.";

@@ -251,14 +251,13 @@ fn fit_direction(
     }
     let fit = fit.no_better_than_stated();
     let variance = fit.covariance(0, 0) + 2.0 * fit.covariance(0, 1) + fit.covariance(1, 1);
-    // Not a number where one of the two is unknown.
-    let known = !variance.is_nan();
     Ok(DirectionFit {
         model: model(&fit.values, fixed),
-        breakaway_error_v: if known {
-            variance.max(0.0).sqrt()
-        } else {
+        // Not a number where one of the two is unknown.
+        breakaway_error_v: if variance.is_nan() {
             f64::INFINITY
+        } else {
+            variance.max(0.0).sqrt()
         },
         fit,
         speeds_mm_s: (low, high),
